@@ -1,0 +1,1 @@
+"""Lower: from an `ImageProgram` to a `KernelProgram`, pass by pass; no pass changes a value beyond the bound it states."""

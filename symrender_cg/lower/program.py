@@ -1,0 +1,117 @@
+"""`KernelProgram`: the steps of a kernel, each with the rate at which it changes, its number format and its formula."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import sympy as sp
+
+from symrender_cg.derive.symbols import symbol
+from symrender_cg.lower.nodes import Node, count
+
+Rate = Literal["frame", "row", "pixel"]
+Format = Literal["int", "float32", "float64", "double_double"]
+RATES: tuple[Rate, ...] = ("frame", "row", "pixel")
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """name = value, once a frame, a row or a pixel. The value is a sympy expression, and after freezing a `Node`."""
+
+    name: str
+    value: sp.Basic
+    section: str
+    meaning: str = ""
+    source: str = ""
+    rate: Rate = "frame"
+    format: Format = "float64"
+
+    @property
+    def symbol(self) -> sp.Symbol:
+        """The symbol that later steps use for this one."""
+        return symbol(self.name)
+
+    def uses(self) -> set[str]:
+        """Names that the value refers to."""
+        return {s.name for s in self.value.free_symbols}
+
+
+@dataclass(frozen=True, slots=True)
+class KernelProgram:
+    """The steps of one kernel in their order.
+
+    hit      names whose signs decide whether the ray hits: the first not negative, the others positive
+    ends     names of the row's left and right end of the hits on it, or none: then every pixel is tested
+    result   the name of the intensity where the ray hits
+    inputs   names of the numbers that the kernel is called with, in the order of its scene structure
+    """
+
+    name: str
+    steps: tuple[Step, ...]
+    hit: tuple[str, ...]
+    ends: tuple[str, str] | None
+    result: str
+    inputs: tuple[str, ...]
+    background: str = "background"
+
+    def __getitem__(self, name: str) -> Step:
+        for step in self.steps:
+            if step.name == name:
+                return step
+        raise KeyError(name)
+
+    def __contains__(self, name: object) -> bool:
+        return any(step.name == name for step in self.steps)
+
+    def at(self, rate: Rate) -> tuple[Step, ...]:
+        """The steps of one rate."""
+        return tuple(step for step in self.steps if step.rate == rate)
+
+    @property
+    def outputs(self) -> frozenset[str]:
+        """Names that the entry points need, beside what steps use of one another."""
+        ends = self.ends or ()
+        scale = {"plane_unit"} if "plane_unit" in self else set()
+        return frozenset({self.result, self.background, "d_dot_d", *self.hit, *ends, *scale})
+
+    def with_steps(self, steps: Iterable[Step]) -> KernelProgram:
+        """The same kernel with other steps."""
+        return replace(self, steps=tuple(steps))
+
+    def map(self, change: dict[str, sp.Basic]) -> KernelProgram:
+        """The same kernel with the values of the named steps replaced."""
+        return self.with_steps(
+            replace(step, value=change[step.name]) if step.name in change else step for step in self.steps
+        )
+
+    def check(self) -> None:
+        """The invariants that hold after every pass: names defined once, before they are used, at no slower rate."""
+        rates: dict[str, int] = {}
+        for step in self.steps:
+            assert step.name not in rates, f"{step.name} is defined twice"
+            for name in step.uses():
+                known = name in rates or name in self.inputs or name in ("x", "y")
+                assert known, f"{step.name} uses {name} before its definition"
+                assert rates.get(name, 0) <= RATES.index(step.rate), f"{step.name} changes slower than {name}"
+            rates[step.name] = RATES.index(step.rate)
+
+    def operations(self) -> Counter[str]:
+        """Operations of all steps, each once: by kind after freezing, as sympy counts them (`ops`) before."""
+        total: Counter[str] = Counter()
+        for step in self.steps:
+            total += operations_of(step)
+        return total
+
+    def text(self) -> str:
+        """The program as text, a line a step: what a user prints after any pass."""
+        return "\n".join(f"{step.rate:5} {step.format:13} {step.name} = {step.value}" for step in self.steps)
+
+
+def operations_of(step: Step) -> Counter[str]:
+    """Operations of one step."""
+    if isinstance(step.value, Node):
+        return count(step.value)
+    return Counter({"ops": int(sp.count_ops(step.value))})

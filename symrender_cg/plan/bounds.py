@@ -1,0 +1,59 @@
+"""What no plan covers: scenes of more than one sphere or light, and lengths so far apart that float64 cannot hold
+their squares. Such a scene is refused before anything is derived.
+"""
+
+from __future__ import annotations
+
+import math
+
+from symrender_cg.errors import OutsidePlanError
+from symrender_cg.scene import Scene
+
+LARGEST_RATIO = 2.0**200
+"""Largest ratio of the distances of eye and centre to the radius: its fifth power is still a float64."""
+
+LARGEST_RATIO_SINGLE = 2.0**60
+"""The same for the kernels that shade in float32."""
+
+SMALLEST_LENGTH = 2.0**-900
+LARGEST_LENGTH = 2.0**1000
+
+
+def require_supported(scene: Scene) -> None:
+    """Raises OutsidePlanError unless the camera-frame scene is one that kernels can be proved right for."""
+    if len(scene.spheres) != 1 or len(scene.lights) != 1:
+        raise OutsidePlanError(
+            f"scene: {len(scene.spheres)} spheres and {len(scene.lights)} lights; kernels are derived for one sphere "
+            "and one light"
+        )
+    sphere, light = scene.spheres[0], scene.lights[0]
+    eye = scene.camera.eye[2]
+    places = {
+        "camera.eye": (eye,),
+        "spheres[0].radius": (sphere.radius,),
+        "spheres[0].center": sphere.center,
+        "lights[0].position": light.position,
+    }
+    for place, values in places.items():
+        if max(abs(value) for value in values) > LARGEST_LENGTH:
+            raise OutsidePlanError(
+                f"{place}: {values} is longer than 2^1000; give the scene in another unit of length"
+            )
+    for place, value in (("camera.eye", eye), ("spheres[0].radius", sphere.radius)):
+        if value < SMALLEST_LENGTH:
+            raise OutsidePlanError(
+                f"{place}: {value} is below 2^-900 in the camera's frame; give the scene in another unit of length"
+            )
+    if spread(scene) > LARGEST_RATIO:
+        raise OutsidePlanError(
+            f"spheres[0].radius: {sphere.radius} is more than 2^200 times smaller than the distance to the eye or than "
+            "the offset of the centre; float64 cannot hold the squares of both"
+        )
+
+
+def spread(scene: Scene) -> float:
+    """The largest of eye distance and centre offset, in radii; infinity where the quotient overflows."""
+    sphere = scene.spheres[0]
+    longest = max(scene.camera.eye[2], *(abs(c) for c in sphere.center))
+    ratio = longest / sphere.radius if sphere.radius > 1.0 else math.ldexp(longest, -1) / sphere.radius * 2.0
+    return abs(ratio)
