@@ -21,7 +21,7 @@ from symrender_cg.derive.exact import SignTest
 from symrender_cg.derive.symbols import INPUTS, symbol
 from symrender_cg.emit.printer import C_TYPES, KernelPrinter
 from symrender_cg.lower.nodes import Call, walk
-from symrender_cg.lower.program import KernelProgram, Step, operations_of
+from symrender_cg.lower.program import RATES, KernelProgram, Step, operations_of
 from symrender_cg.lower.variants import Variant
 from symrender_cg.plan.plan import Plan
 from symrender_cg.resources import template_path, templates
@@ -29,7 +29,7 @@ from symrender_cg.version import VERSION
 
 WIDTH = 120
 SUPPORT = {
-    "grid.h": None,
+    "inline.h": None,
     "span.h": None,
     "units.h": ("unit_exponent", "light_exponent"),
     "square.h": ("square",),
@@ -48,7 +48,7 @@ class Emitted:
     cdef: str
     inputs: tuple[str, ...]
     result_type: str
-    operations: Mapping[str, Mapping[str, int]]
+    operations: dict[str, dict[str, int]]
 
 
 def emit(
@@ -69,7 +69,8 @@ def emit(
     includes = [
         header
         for header, functions in SUPPORT.items()
-        if (header == "exact_sign.h" and variant.exact)
+        if header == "inline.h"
+        or (header == "exact_sign.h" and variant.exact)
         or (header == "span.h" and program.ends)
         or (header == "double_double.h" and double_double)
         or (functions and header != "double_double.h" and uses & set(functions))
@@ -88,7 +89,7 @@ def emit(
         "span": program.ends is not None,
         "exact": variant.exact,
         "scaled": "plane_unit" in program,
-        "counts": {rate: _counts(program.at(rate)) for rate in ("frame", "row", "pixel")},
+        "counts": {rate: _counts(program.at(rate)) for rate in RATES},
         "fields": [(row.name, row.meaning) for row in INPUTS if f"scene_{row.name}" in program.inputs],
         "sign_tests": [_printed(test, numbers) for test in sign_tests],
         "result": program.result,
@@ -106,7 +107,7 @@ def emit(
         cdef=_environment().get_template("kernel.cdef.j2").render(context),
         inputs=tuple(entry.removeprefix("scene_") for entry in program.inputs),
         result_type=str(context["real"]),
-        operations={rate: dict(_operations(program.at(rate))) for rate in ("frame", "row", "pixel")},  # type: ignore[arg-type]
+        operations={rate: dict(_operations(program.at(rate))) for rate in RATES},
     )
 
 

@@ -18,6 +18,7 @@ from symrender_cg.lower.nodes import (
     Call,
     Cast,
     Difference,
+    Greater,
     Larger,
     Negative,
     Node,
@@ -52,6 +53,7 @@ _LEVEL: Mapping[type[Node], int] = {
     Larger: _CHOICE,
     Select: _CHOICE,
     Positive: _COMPARE,
+    Greater: _COMPARE,
     NotNegative: _COMPARE,
     Zero: _COMPARE,
     Both: _AND,
@@ -128,6 +130,9 @@ class KernelPrinter(C99CodePrinter):  # type: ignore[misc]
 
     def _print_Positive(self, node: Positive) -> str:
         return f"{self._operand(node.args[0], _PLUS)} > {self._zero()}"
+
+    def _print_Greater(self, node: Greater) -> str:
+        return f"{self._operand(node.args[0], _PLUS)} > {self._operand(node.args[1], _PLUS)}"
 
     def _print_NotNegative(self, node: NotNegative) -> str:
         return f"{self._operand(node.args[0], _PLUS)} >= {self._zero()}"

@@ -64,7 +64,7 @@ class PowerTables:
 def power_tables(form: Format) -> PowerTables:
     """Fit, round, and prove; about half a second."""
     exp2_degree, log_degree = DEGREES[form]
-    exp2_tail = _rounded(form, fit_minimax(_exp2_tail, _exp2_weight, _real(EXP2_INTERVAL), exp2_degree))
+    exp2_tail = _rounded(form, fit_minimax(_exp2_tail, lambda _: mpmath.mpf(1), _real(EXP2_INTERVAL), exp2_degree))
     log_tail = _rounded(form, fit_minimax(_log_tail, lambda z: z, _real(LOG_INTERVAL), log_degree))
     with mpmath.workdps(DIGITS):
         inverse_ln2 = form.round(1 / mpmath.log(2))
@@ -76,11 +76,6 @@ def power_tables(form: Format) -> PowerTables:
 def _exp2_tail(r: Any) -> Any:
     """(2^r - 1) / r."""
     return mpmath.expm1(r * mpmath.log(2)) / r
-
-
-def _exp2_weight(r: Any) -> Any:
-    """|r|, by which an error of q counts in 2^r, kept away from 0 so that the exchange stays regular."""
-    return abs(r) + mpmath.mpf(1) / 10
 
 
 def _log_tail(z: Any) -> Any:

@@ -74,7 +74,7 @@ def bound_power(
     inverse_ln2: float,
     precision: int,
 ) -> PowerBounds:
-    """Bounds for rounded coefficients, lowest first, and 1 / ln 2 as rounded; the errors are those of the polynomials."""
+    """Bounds for the rounded coefficients, lowest first, and for 1 / ln 2 as rounded; the two errors are relative."""
     with flint.ctx.workprec(PRECISION):
         unit = ball(Fraction(1, 2**precision))
         sums = {sign: _log2_errors(log_tail, inverse_ln2, ball(Fraction(log_error)), unit, sign) for sign in (-1, 1)}

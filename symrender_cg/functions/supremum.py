@@ -16,7 +16,7 @@ Ball = Any  # flint.arb and flint.arb_poly: python-flint has no complete type in
 BallPolynomial = Any
 
 PRECISION = 200
-PIECES = 64
+PIECES = 512
 
 
 def bound_of_quotient(
@@ -26,7 +26,7 @@ def bound_of_quotient(
 ) -> float:
     """An upper bound of |numerator(x) / denominator(x)| over the interval; a double, rounded up.
 
-    On each of 64 pieces, numerator(c + h t) = sum of b_k t^k with |t| <= 1, so |numerator| <= sum |b_k|: no dependency
+    On each of 512 pieces, numerator(c + h t) = sum of b_k t^k with |t| <= 1, so |numerator| <= sum |b_k|: no dependency
     between the terms is lost, however strongly they cancel. `denominator` maps a ball to a ball and may not contain 0.
     """
     lowest, highest = interval

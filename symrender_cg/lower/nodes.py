@@ -78,6 +78,10 @@ class Positive(Node):
     """The condition a > 0."""
 
 
+class Greater(Node):
+    """The condition a > b."""
+
+
 class NotNegative(Node):
     """The condition a >= 0."""
 

@@ -470,8 +470,7 @@ def _highlight(
         exponent /= w_w[near]
         np.minimum(exponent, 0.5, out=exponent)
         np.log1p(np.negative(exponent, out=exponent), out=exponent)
-        exponent *= base.dtype.type(0.5 * shininess)
-        power[near] = np.exp(exponent, out=exponent)
+        power[near] = np.exp(exponent * np.float64(0.5 * shininess))  # n may be beyond float32
     return power
 
 

@@ -1,0 +1,90 @@
+"""symrender_cg: a scene becomes its image as one formula, the formula C99, the C99 a native `render_image()`.
+
+    from symrender_cg import Scene, render_image
+    image = render_image(Scene.chapter1(), 1920, 1080)
+
+Nothing heavy is imported until it is used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from symrender_cg.version import VERSION as __version__
+
+if TYPE_CHECKING:
+    from symrender_cg.errors import (
+        AccuracyError,
+        ArgumentError,
+        CompileError,
+        CompilerNotFoundError,
+        LibraryError,
+        OutsidePlanError,
+        SceneError,
+        SymrenderError,
+        ToolchainError,
+    )
+    from symrender_cg.pipeline import compile_kernel, statistics, translate
+    from symrender_cg.plan.plan import plan
+    from symrender_cg.run.render import evaluate, render_image
+    from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere, load_scene
+
+_HOME = {
+    "Camera": "scene",
+    "Phong": "scene",
+    "PointLight": "scene",
+    "Scene": "scene",
+    "Sphere": "scene",
+    "load_scene": "scene",
+    "compile_kernel": "pipeline",
+    "statistics": "pipeline",
+    "translate": "pipeline",
+    "plan": "plan.plan",
+    "evaluate": "run.render",
+    "render_image": "run.render",
+    "AccuracyError": "errors",
+    "ArgumentError": "errors",
+    "CompileError": "errors",
+    "CompilerNotFoundError": "errors",
+    "LibraryError": "errors",
+    "OutsidePlanError": "errors",
+    "SceneError": "errors",
+    "SymrenderError": "errors",
+    "ToolchainError": "errors",
+}
+
+__all__ = [
+    "AccuracyError",
+    "ArgumentError",
+    "Camera",
+    "CompileError",
+    "CompilerNotFoundError",
+    "LibraryError",
+    "OutsidePlanError",
+    "Phong",
+    "PointLight",
+    "Scene",
+    "SceneError",
+    "Sphere",
+    "SymrenderError",
+    "ToolchainError",
+    "__version__",
+    "compile_kernel",
+    "evaluate",
+    "load_scene",
+    "plan",
+    "render_image",
+    "statistics",
+    "translate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
