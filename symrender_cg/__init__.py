@@ -26,7 +26,6 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from symrender_cg.pipeline import compile_kernel, statistics, translate
-    from symrender_cg.plan.plan import plan
     from symrender_cg.run.render import evaluate, render_image
     from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere, load_scene
 
@@ -40,7 +39,6 @@ _HOME = {
     "compile_kernel": "pipeline",
     "statistics": "pipeline",
     "translate": "pipeline",
-    "plan": "plan.plan",
     "evaluate": "run.render",
     "render_image": "run.render",
     "AccuracyError": "errors",
@@ -73,7 +71,6 @@ __all__ = [
     "compile_kernel",
     "evaluate",
     "load_scene",
-    "plan",
     "render_image",
     "statistics",
     "translate",

@@ -1,7 +1,7 @@
 """The registry of forms: algebraically equal ways to compute the named quantities of the derivation.
 
-A form states the definitions that it brings, the scenes it is for, what it removes, and its claims: pairs of a new
-quantity and what it equals in the textbook derivation. `proofs.prove` shows every claim's difference to be 0; the
+A form states the definitions that it brings, the scenes it is for, what it removes, and its claims: what each new
+quantity equals in the textbook's derivation. `proofs.prove` shows every claim's difference to be 0; the
 tests run it over the whole registry. Adding a form is adding one entry here.
 
 The forms below measure lengths of the scene in radii and write f for the distance of the image plane from the eye,
@@ -10,8 +10,8 @@ which is e: rays may be scaled apart from the scene, as only their direction cou
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -19,6 +19,24 @@ from symrender_cg.derive.program import Definition, ImageProgram
 from symrender_cg.derive.symbols import symbol, symbols
 
 S = symbol
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """left = right: a new quantity and what it equals in the textbook's derivation.
+
+    given    textbook quantities in new ones, by an earlier claim or by definition; they are not expanded
+    keep     new quantities that the proof need not look into
+    facts    what kept symbols are, used last
+    squares  symbols with a known square
+    """
+
+    left: sp.Expr
+    right: sp.Expr
+    given: Mapping[str, sp.Expr] = field(default_factory=dict)
+    keep: tuple[str, ...] = ()
+    facts: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    squares: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +52,7 @@ class Form:
     definitions: Callable[[ImageProgram], tuple[Definition, ...]]
     removes: str
     source: str
-    claims: Callable[[], tuple[tuple[sp.Expr, sp.Expr], ...]]
+    claims: Callable[[], tuple[Claim, ...]]
     off_axis: bool | None = None
     front_test: bool | None = None
     brings: tuple[str, ...] = ()
@@ -65,8 +83,8 @@ def _quadratic_disc(_: ImageProgram) -> tuple[Definition, ...]:
     return (Definition("disc", value, "ray and sphere", "disc = (m.D)^2 - |D|^2 (|m|^2 - R^2): a hit where >= 0"),)
 
 
-def _disc_claim() -> tuple[tuple[sp.Expr, sp.Expr], ...]:
-    return ((S("disc"), S("disc")),)
+def _disc_claim() -> tuple[Claim, ...]:
+    return (Claim(S("disc"), S("disc")),)
 
 
 # --------------------------------------------------------------------- the span of a row: where its hits begin and end
@@ -148,12 +166,8 @@ def _facing() -> tuple[Definition, ...]:
     )
 
 
-def _facing_claims() -> tuple[tuple[sp.Expr, sp.Expr], ...]:
-    return (
-        (S("facing2") * S("radius") ** 2, S("disc")),
-        (S("facing") * S("radius"), S("root")),
-        (S("d_dot_d"), S("d_dot_d")),
-    )
+def _facing_claims() -> tuple[Claim, ...]:
+    return Claim(S("facing2") * S("radius") ** 2, S("disc")), Claim(S("d_dot_d"), S("d_dot_d"))
 
 
 def _any_sphere(_: ImageProgram) -> tuple[Definition, ...]:
@@ -181,8 +195,8 @@ def _any_sphere(_: ImageProgram) -> tuple[Definition, ...]:
     )
 
 
-def _any_sphere_claims() -> tuple[tuple[sp.Expr, sp.Expr], ...]:
-    return (*_facing_claims(), (S("before_eye") * S("radius"), S("m_dot_d")))
+def _any_sphere_claims() -> tuple[Claim, ...]:
+    return (*_facing_claims(), Claim(S("before_eye") * S("radius"), S("m_dot_d")))
 
 
 # ----------------------------------------------------------------------------------------- the normal from the foot point
@@ -234,8 +248,10 @@ def _any_normal(_: ImageProgram) -> tuple[Definition, ...]:
     )
 
 
-def _normal_claims() -> tuple[tuple[sp.Expr, sp.Expr], ...]:
-    return tuple((S(f"n_{axis}"), S(f"n_{axis}")) for axis in "xyz")
+def _normal_claims() -> tuple[Claim, ...]:
+    """Given root = R facing: both are not negative, and their squares are equal by the claims on facing2."""
+    root = {"root": S("radius") * S("facing")}
+    return tuple(Claim(S(f"n_{axis}"), S(f"n_{axis}"), given=root, keep=("facing",)) for axis in "xyz")
 
 
 # --------------------------------------------------------------------------------------------------- light and highlight
@@ -270,11 +286,19 @@ def _light_in_radii(program: ImageProgram) -> tuple[Definition, ...]:
     )
 
 
-def _light_claims() -> tuple[tuple[sp.Expr, sp.Expr], ...]:
+def _light_claims() -> tuple[Claim, ...]:
+    """Given P = C + R n, and then w (textbook) = R w, |w| (textbook) = R |w|."""
+    radius, normal = S("radius"), ("n_x", "n_y", "n_z")
+    hit = {f"hit_{axis}": S(f"center_{axis}") + radius * S(f"n_{axis}") for axis in "xyz"}
+    w = {f"w_{axis}": radius * S(f"w_{axis}") for axis in "xyz"}
+    length = {"w_length": radius / sp.sqrt(S("inv_w2"))}
+    same = {name: S(name) for name in normal}
     return (
-        *((S(f"w_{axis}") * S("radius"), S(f"w_{axis}")) for axis in "xyz"),
-        (S("w2") * S("radius") ** 2, S("w_length") ** 2),
-        (S("n_dot_l"), S("n_dot_l")),
+        *(Claim(S(f"w_{axis}") * radius, S(f"w_{axis}"), given=hit, keep=normal) for axis in "xyz"),
+        Claim(S("w2") * radius**2, S("w_length") ** 2, given=w, keep=("w_x", "w_y", "w_z")),
+        Claim(
+            S("n_dot_l"), S("n_dot_l"), given=w | length | same, keep=(*normal, "w_x", "w_y", "w_z", "inv_w2")
+        ),
     )
 
 
@@ -329,8 +353,24 @@ def _mirrored_ray(program: ImageProgram) -> tuple[Definition, ...]:
     )
 
 
-def _mirror_claims() -> tuple[tuple[sp.Expr, sp.Expr], ...]:
-    return ((S("cos2"), S("r_dot_v") ** 2), (S("sin2"), 1 - S("r_dot_v") ** 2))
+def _mirror_claims() -> tuple[Claim, ...]:
+    """Given l = w / |w|, n.v = facing / |D|; at last facing = -n.D and |n| = 1."""
+    length, distance = sp.sqrt(S("inv_w2")), sp.sqrt(S("inv_d2"))
+    x, y, eye = symbols("x y eye")
+    n, w = symbols("n_x n_y n_z"), symbols("w_x w_y w_z")
+    given = {f"l_{axis}": S(f"w_{axis}") * length for axis in "xyz"} | {f"n_{axis}": S(f"n_{axis}") for axis in "xyz"}
+    given |= {"d_length": 1 / distance, "n_dot_v": S("facing") * distance}
+    keep = tuple(str(s) for s in (*n, *w)) + ("facing", "inv_w2", "inv_d2")
+    facts = {
+        S("facing"): -(n[0] * x + n[1] * y - n[2] * eye),
+        S("inv_w2"): 1 / (w[0] ** 2 + w[1] ** 2 + w[2] ** 2),
+        S("inv_d2"): 1 / (x**2 + y**2 + eye**2),
+    }
+    unit = {n[2]: 1 - n[0] ** 2 - n[1] ** 2}
+    return (
+        Claim(S("cos2"), S("r_dot_v") ** 2, given, keep, facts, unit),
+        Claim(S("sin2"), 1 - S("r_dot_v") ** 2, given, keep, facts, unit),
+    )
 
 
 def _diffuse_gain(program: ImageProgram) -> tuple[Definition, ...]:
@@ -341,8 +381,9 @@ def _diffuse_gain(program: ImageProgram) -> tuple[Definition, ...]:
     )
 
 
-def _diffuse_claims() -> tuple[tuple[sp.Expr, sp.Expr], ...]:
-    return ((S("diffuse"), S("light_intensity") * S("diffuse")),)
+def _diffuse_claims() -> tuple[Claim, ...]:
+    same = {"n_dot_l": S("n_dot_l")}
+    return (Claim(S("diffuse"), S("light_intensity") * S("diffuse"), given=same, keep=("n_dot_l",)),)
 
 
 def _gained(program: ImageProgram) -> tuple[Definition, ...]:
@@ -453,8 +494,11 @@ def form(name: str) -> Form:
     raise KeyError(name)
 
 
-def apply(program: ImageProgram, chosen: tuple[Form, ...]) -> ImageProgram:
-    """The program with the definitions of the chosen forms in place of its own, in an order that defines before use."""
+def apply(program: ImageProgram, chosen: tuple[Form, ...], *, keep_all: bool = False) -> ImageProgram:
+    """The program with the definitions of the chosen forms in place of its own, in an order that defines before use.
+
+    Definitions that nothing uses are left out, unless `keep_all` asks for them (a proof may speak of them).
+    """
     table = {definition.name: definition for definition in program.definitions}
     rename: dict[str, str] = {}
     for entry in chosen:
@@ -473,6 +517,8 @@ def apply(program: ImageProgram, chosen: tuple[Form, ...]) -> ImageProgram:
 
     for name in (*guard, *table):
         place(name)
+    if keep_all:
+        return ImageProgram(program.name, tuple(ordered), guard, program.value, program.background)
     return ImageProgram(program.name, (), guard, program.value, program.background).replacing(tuple(ordered))
 
 

@@ -1,11 +1,11 @@
 """What the compiled kernels are compared with: float references that need no compiler, and an oracle that is proved.
 
-    per_pixel     the seed's Cell 1, a python loop                         another float implementation
-    vectorised    the seed's Cell 4, and the stable forms by numpy         another float implementation, the numpy backend
-    oracle        exact integers and Arb balls, correctly rounded          the truth
+    per_pixel     the seed's Cell 1, a python loop                     a reference
+    vectorised    the seed's Cell 4, and the stable forms by numpy     a reference, and the backend without a compiler
+    oracle        exact integers and Arb balls, correctly rounded      the truth
     points        pixel centres, and points where an image is hard to get right
     compare       largest errors of float values against the oracle's answers
 
-Each takes a Scene with one sphere and one light, moves it to the camera's frame, and takes those float64 numbers as exact.
+Each takes a Scene with one sphere and one light, moves it to the camera's frame, and takes those numbers as exact.
 Import the module that you need: only `oracle` and `compare` load python-flint.
 """

@@ -242,7 +242,8 @@ def near_terminator(scene: Scene, count: int, seed: int) -> Points:
 
 
 def near_highlight(scene: Scene, count: int, seed: int) -> Points:
-    """Points about r.v = 1: a quarter within two floats of it, the rest 1e-17 .. 3/sqrt(n) radians off.
+    """Points about r.v = 1: a quarter within two floats of it, a quarter anywhere up to 3/sqrt(n) radians off (the turn
+    of the normal), the rest 1e-17 .. 3/sqrt(n) off.
 
     The mirror point lies in the plane of eye, centre and light (Alhazen's problem); its angle from the eye is the zero
     of a monotone function, found by bisection. Two float64 arrays of at most `count` entries; empty where the mirror
@@ -263,6 +264,8 @@ def near_highlight(scene: Scene, count: int, seed: int) -> Points:
             turn = random.uniform(0.0, 2.0 * math.pi)
             steps = random.integers(-2, 3, size=2)
             angle = abs(_log_uniform(random, min(-17.0, widest - 3.0), widest))
+            if index % 4 == 1:
+                angle = 10.0**widest * random.uniform(0.0, 1.0)
             if index % 4 == 0:
                 return _stepped(arb(seen[0]), int(steps[0]), False), _stepped(arb(seen[1]), int(steps[1]), False)
             ds, dc = arb(angle).sin_cos()
@@ -306,10 +309,13 @@ def _root_nearest(m: BallVector, r2: arb, e: arb, x: float, y: float) -> arb:
 
     disc = a x^2 + 2 b x + c; |m x D|^2 does not change its value when x and y change places together with m_x and m_y.
     """
+    from flint import arb
+
     mx, my, mz = m
+    exact_y = arb(y)
     a = r2 - mz * mz - my * my
     b = mx * (my * y - mz * e)
-    c = r2 * (y * y + e * e) - (my * e + mz * y) ** 2 - mx * mx * (e * e + y * y)
+    c = (r2 - mx * mx) * (e * e + exact_y * exact_y) - (my * e + mz * y) ** 2
     root = (b * b - a * c).nonnegative_part().sqrt()
     larger = -b - root if b > 0 else -b + root
     candidates = [c / larger] if a.is_zero() else [larger / a, c / larger]

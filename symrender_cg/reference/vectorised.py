@@ -289,14 +289,8 @@ def _shade_inside(view: _View, x: FloatArray, y: FloatArray, image: Floats) -> t
     if columns.size:
         rows = np.flatnonzero(hit.any(axis=1))
         window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        d, c = (
-            (_cut(d[0], window), _cut(d[1], window), _cut(d[2], window)),
-            (
-                _cut(c[0], window),
-                _cut(c[1], window),
-                _cut(c[2], window),
-            ),
-        )
+        d = (_cut(d[0], window), _cut(d[1], window), _cut(d[2], window))
+        c = (_cut(c[0], window), _cut(c[1], window), _cut(c[2], window))
         value = _shade_in_dtype(view, d, c, a_dd[window], np.maximum(disc[window], 0.0), image.dtype)
         np.copyto(image[window], value, where=hit[window])
     return np.nonzero(possible)

@@ -1,0 +1,253 @@
+"""The options of every command with their help. Imports nothing but what names accuracies and sizes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import NoReturn
+
+from symrender_cg.errors import ArgumentError
+from symrender_cg.lower.variants import ACCURACIES
+from symrender_cg.version import VERSION
+
+LARGEST_SIDE = 1 << 24
+SCENE_HELP = "a built-in scene's name or a TOML file; Chapter 1's scene if left out (render --list names the others)"
+
+_DESCRIPTION = """\
+A scene becomes its image as one formula, the formula readable C99, the C99 a native kernel.
+
+Exit codes: 0 done, 2 usage or scene, 3 outside what a plan covers, 4 a stated bound broken, 5 no compiler or a failed
+compilation, 130 interrupted."""
+
+_EXAMPLES = """\
+examples:
+  python -m symrender_cg build                          Chapter 1's kernels as C under generated/, compiled
+  python -m symrender_cg render -o sphere.png           its image
+  python -m symrender_cg render scene.toml -o out.png --size 800x600
+  python -m symrender_cg explain off_axis               the plan and the derivation
+  python -m symrender_cg check                          the kernels against numpy and the oracle
+  python -m symrender_cg doctor                         what this machine has and lacks
+"""
+
+_BUILD = """\
+Derives the image of a scene, writes its kernel as C99 under DIR, and compiles it into the cache.
+
+    DIR/<kernel>/<kernel>.c, <kernel>.h, manifest.json     DIR/support/*.h
+
+To compile the C yourself, add both folders to the include path. What is up to date is not touched: a second run derives
+and compiles nothing."""
+_BUILD_EXAMPLES = """\
+examples:
+  python -m symrender_cg build
+  python -m symrender_cg build scene.toml --accuracy double --passes
+  python -m symrender_cg build --accuracy double --bake     the scene's numbers folded into the C
+"""
+
+_RENDER = """\
+Renders a scene to an image file; its extension chooses the format.
+
+    .png   grey, cut to [0, 1]; --bits 8 (default) or 16
+           --encoding srgb (default): the transfer curve of IEC 61966-2-1, declared by an sRGB chunk in the file
+           --encoding linear: grey levels proportional to intensity, declared by a gAMA chunk of 1.0
+    .npy   the array of linear intensities, float64 (float32 with --accuracy single)
+    .pfm   linear intensities as float32, little endian, rows from bottom to top
+
+The file is written whole or not at all."""
+_RENDER_EXAMPLES = """\
+examples:
+  python -m symrender_cg render -o sphere.png
+  python -m symrender_cg render scene.toml -o out.png --size 1920x1080 --bits 16 --encoding linear
+  python -m symrender_cg render off_axis -o field.npy --no-clip
+  python -m symrender_cg render --list
+"""
+
+_EXPLAIN = """\
+Prints what a kernel rests on: the effects that are in and the proof of each one left out, every named quantity with its
+formula and source, the forms that the accuracy chose, the invariants that sympy proved, the silhouette, and operations
+per stage."""
+_EXPLAIN_EXAMPLES = """\
+examples:
+  python -m symrender_cg explain
+  python -m symrender_cg explain off_axis --accuracy single
+  python -m symrender_cg explain --latex > derivation.tex     a document that pdflatex compiles as it is
+"""
+
+_CHECK = """\
+Compares each compiled kernel with the oracle (exact arithmetic and Arb balls, correctly rounded), with vectorised numpy
+and with the per-pixel loop: on the pixel centres of a whole image, and on points near the silhouette, the terminator and
+the highlight. Errors are those of the unclipped field. Exit code 4 when a stated bound is broken."""
+_CHECK_EXAMPLES = """\
+examples:
+  python -m symrender_cg check
+  python -m symrender_cg check far --accuracy literal,double --points 5000
+  python -m symrender_cg check --json > check.json
+"""
+
+_DOCTOR = """\
+Says what this machine has: compiler, flags and target as resolved, the vector width in the kernels' inner loops (from
+the compiler's own report), the cache, Python packages; and how to get what is missing. Exit code 5 without a compiler
+that works."""
+_DOCTOR_EXAMPLES = """\
+examples:
+  python -m symrender_cg doctor
+  python -m symrender_cg doctor --clear-cache
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, with usage errors in the form of all others."""
+
+    def error(self, message: str) -> NoReturn:
+        """Prints what is wrong and where help is, and exits with 2."""
+        print(f"symrender_cg: error: {message}\n{self.format_usage().rstrip()}", file=sys.stderr)
+        print(f"try: python -m {self.prog} --help", file=sys.stderr)
+        raise SystemExit(ArgumentError.exit_code)
+
+
+def build_parser() -> Parser:
+    """The parser of the whole command line; `command` is the module of symrender_cg.cli that runs."""
+    parser = Parser(
+        prog="symrender_cg",
+        description=_DESCRIPTION,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"symrender_cg {VERSION}")
+    parser.add_argument("--debug", action="store_true", help="traceback and log of an error; also SYMRENDER_DEBUG=1")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    _add_build(commands)
+    _add_render(commands)
+    _add_explain(commands)
+    _add_check(commands)
+    _add_doctor(commands)
+    return parser
+
+
+def _command(commands: argparse._SubParsersAction[Parser], name: str, short: str, text: str, examples: str) -> Parser:
+    parser = commands.add_parser(
+        name,
+        help=short,
+        description=text,
+        epilog=examples,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "--debug", action="store_true", default=argparse.SUPPRESS, help="traceback and log of an error"
+    )
+    return parser
+
+
+def _add_build(commands: argparse._SubParsersAction[Parser]) -> None:
+    parser = _command(commands, "build", "derive, write the C, compile", _BUILD, _BUILD_EXAMPLES)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
+    _accuracies(parser, "all")
+    parser.add_argument("--bake", action="store_true", help="fold the scene's numbers into the kernel")
+    _portable(parser)
+    parser.add_argument("--out", default="generated", metavar="DIR", help="folder for the C (default: generated)")
+    parser.add_argument("--passes", action="store_true", help="derive anew, and show every pass of the lowering")
+
+
+def _add_render(commands: argparse._SubParsersAction[Parser]) -> None:
+    parser = _command(commands, "render", "render a scene to .png, .npy or .pfm", _RENDER, _RENDER_EXAMPLES)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
+    parser.add_argument("-o", "--output", metavar="FILE", help="the image file: .png, .npy or .pfm")
+    _size(parser, (512, 512))
+    _accuracy(parser)
+    parser.add_argument("--threads", type=int, metavar="N", help="threads (default: by size; any number, same bits)")
+    parser.add_argument("--bits", type=int, choices=(8, 16), help="of a .png (default: 8)")
+    parser.add_argument("--encoding", choices=("srgb", "linear"), help="of a .png (default: srgb)")
+    parser.add_argument("--no-clip", action="store_true", help="keep intensities above 1; .npy and .pfm only")
+    _portable(parser)
+    parser.add_argument(
+        "--backend", choices=("native", "numpy"), default="native", help="numpy needs no compiler and is slower"
+    )
+    parser.add_argument("--list", action="store_true", help="list the built-in scenes and exit")
+
+
+def _add_explain(commands: argparse._SubParsersAction[Parser]) -> None:
+    parser = _command(commands, "explain", "the plan, the derivation, the proofs", _EXPLAIN, _EXPLAIN_EXAMPLES)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
+    _accuracy(parser)
+    forms = parser.add_mutually_exclusive_group()
+    forms.add_argument("--latex", action="store_true", help="a whole LaTeX document (article class, amsmath)")
+    forms.add_argument("--json", action="store_true", help="everything as one JSON object")
+
+
+def _add_check(commands: argparse._SubParsersAction[Parser]) -> None:
+    parser = _command(commands, "check", "compare the kernels with references and oracle", _CHECK, _CHECK_EXAMPLES)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
+    _size(parser, (96, 96))
+    parser.add_argument(
+        "--points", type=_count, default=1000, metavar="N", help="points near each hard place (default: 1000)"
+    )
+    parser.add_argument("--seed", type=_count, default=1, metavar="N", help="of those points (default: 1)")
+    _accuracies(parser, "all")
+    _portable(parser)
+    parser.add_argument("--json", action="store_true", help="the table as one JSON object")
+
+
+def _add_doctor(commands: argparse._SubParsersAction[Parser]) -> None:
+    parser = _command(commands, "doctor", "compiler, target, vector width, cache", _DOCTOR, _DOCTOR_EXAMPLES)
+    _portable(parser)
+    parser.add_argument("--json", action="store_true", help="everything as one JSON object")
+    parser.add_argument("--clear-cache", action="store_true", help="remove every cached kernel, say what, and exit")
+
+
+def _size(parser: Parser, default: tuple[int, int]) -> None:
+    parser.add_argument(
+        "--size",
+        type=image_size,
+        default=default,
+        metavar="WxH",
+        help=f"width x height in pixels (default: {default[0]}x{default[1]})",
+    )
+
+
+def _accuracy(parser: Parser) -> None:
+    parser.add_argument(
+        "--accuracy", choices=ACCURACIES, default="double", metavar="A", help=f"{', '.join(ACCURACIES)} (default: double)"
+    )
+
+
+def _accuracies(parser: Parser, default: str) -> None:
+    parser.add_argument(
+        "--accuracy",
+        type=accuracy_list,
+        default=default,
+        metavar="A[,A]",
+        help=f"some of {', '.join(ACCURACIES)}, with commas, or all (default: {default})",
+    )
+
+
+def _portable(parser: Parser) -> None:
+    parser.add_argument("--portable", action="store_true", help="compile for any processor of this kind")
+
+
+def image_size(text: str) -> tuple[int, int]:
+    """`800x600` -> (800, 600). Raises ArgumentTypeError for anything else."""
+    sides = text.lower().split("x")
+    if len(sides) == 2 and all(side.isascii() and side.isdigit() for side in sides):
+        width, height = int(sides[0][:12]), int(sides[1][:12])
+        if 1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE:
+            return width, height
+    raise argparse.ArgumentTypeError(
+        f"{text!r} is not a size; expected WIDTHxHEIGHT in pixels, each from 1 to {LARGEST_SIDE}, such as 800x600"
+    )
+
+
+def accuracy_list(text: str) -> tuple[str, ...]:
+    """`double,literal` -> those accuracies in the order of the package, each once; `all` -> all of them."""
+    names = [name.strip() for name in text.split(",")]
+    if unknown := [name for name in names if name not in (*ACCURACIES, "all")]:
+        raise argparse.ArgumentTypeError(
+            f"{unknown[0]!r} is not known; expected some of {', '.join(ACCURACIES)}, or all"
+        )
+    return ACCURACIES if "all" in names else tuple(name for name in ACCURACIES if name in names)
+
+
+def _count(text: str) -> int:
+    if text.isascii() and text.isdigit() and len(text) <= 9:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is not a count; expected a whole number from 0 up")

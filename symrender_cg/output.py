@@ -1,0 +1,175 @@
+"""Image files: intensities -> .png, .npy or .pfm, each written whole or not at all.
+
+Comes in: float intensities of shape (height, width), row 0 at the top. Goes out: one file.
+Never done here: rendering, a format guessed from anything but the name, a half-written file.
+
+    .png   grey of 8 or 16 bits; intensities are cut to [0, 1], encoded, and rounded to the nearest level
+           srgb     the transfer curve of IEC 61966-2-1; the file says so by an sRGB chunk (and gAMA 0.45455)
+           linear   levels proportional to intensity; the file says so by a gAMA chunk of 1.0
+    .npy   the array itself, in its own format
+    .pfm   float32, little endian, rows from bottom to top; linear intensity
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrender_cg.errors import ArgumentError
+
+SUFFIXES: Final = (".png", ".npy", ".pfm")
+BITS: Final = (8, 16)
+ENCODINGS: Final = ("srgb", "linear")
+_PIXELS_A_BLOCK: Final = 1 << 18
+_SRGB_CHUNK: Final = (b"sRGB", b"\0")  # rendering intent 0, perceptual
+_GAMMA: Final = {"srgb": 45455, "linear": 100000}  # PNG stores gamma times 100,000
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFormat:
+    """What a file will hold. `bits` and `encoding` are of .png; None where the file keeps the numbers themselves."""
+
+    suffix: str
+    bits: int | None = None
+    encoding: str | None = None
+
+    @property
+    def keeps_field(self) -> bool:
+        """Whether intensities above 1 can be written."""
+        return self.bits is None
+
+    def __str__(self) -> str:
+        if self.bits is not None:
+            return f"{self.bits} bit grey, {'sRGB' if self.encoding == 'srgb' else 'linear'}"
+        return "numpy array, linear" if self.suffix == ".npy" else "float32, linear"
+
+
+def image_format(path: str | Path, *, bits: int | None = None, encoding: str | None = None) -> ImageFormat:
+    """The format that a file's name asks for; PNG is 8 bit sRGB unless told otherwise.
+
+    Raises ArgumentError for another extension, unknown bits or encoding, and for either where the format has none.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ArgumentError(
+            f"{path}: the extension {suffix!r} names no image format; expected one of {', '.join(SUFFIXES)}"
+        )
+    if suffix != ".png":
+        for name, given in (("bits", bits), ("encoding", encoding)):
+            if given is not None:
+                raise ArgumentError(
+                    f"{name}: {given} has no meaning for {suffix}, which holds the linear intensities as numbers; "
+                    "leave it out, or write a .png"
+                )
+        return ImageFormat(suffix)
+    chosen = ImageFormat(suffix, 8 if bits is None else bits, "srgb" if encoding is None else encoding)
+    if chosen.bits not in BITS:
+        raise ArgumentError(f"bits: {bits!r} is not offered; expected 8 or 16")
+    if chosen.encoding not in ENCODINGS:
+        raise ArgumentError(f"encoding: {encoding!r} is not known; expected 'srgb' or 'linear'")
+    return chosen
+
+
+def write_image(
+    path: str | Path, values: NDArray[Any], *, bits: int | None = None, encoding: str | None = None
+) -> ImageFormat:
+    """Writes intensities (height, width) to a file in the format of its name, which is returned.
+
+    Raises ArgumentError for what image_format refuses, an array of another kind, intensities that are not finite in a
+    .png, and a place that cannot be written. Whatever happens, the path holds the old file or the whole new one.
+    """
+    chosen = image_format(path, bits=bits, encoding=encoding)
+    if values.ndim != 2 or values.dtype.kind != "f" or values.size == 0:
+        raise ArgumentError(
+            f"values: dtype {values.dtype} and shape {values.shape}; expected floating-point intensities of shape "
+            "(height, width), at least one pixel"
+        )
+    if chosen.suffix == ".png":
+        levels = quantise(values, chosen)
+        with replacing(path) as file:
+            _write_png(file, levels, chosen)
+    else:
+        with replacing(path) as file:
+            (_write_npy if chosen.suffix == ".npy" else _write_pfm)(file, values)
+    return chosen
+
+
+def srgb(intensity: NDArray[Any]) -> NDArray[Any]:
+    """12.92 v where v <= 0.0031308, else 1.055 v^(1/2.4) - 0.055, for v in [0, 1]   (IEC 61966-2-1)"""
+    curve = 1.055 * np.power(np.maximum(intensity, 0.0031308), 1.0 / 2.4) - 0.055
+    return np.where(intensity <= 0.0031308, 12.92 * intensity, curve)
+
+
+def quantise(values: NDArray[Any], form: ImageFormat) -> NDArray[Any]:
+    """round((2^bits - 1) encoded(clip(v, 0, 1))), uint8 or uint16, halves to even.
+
+    Raises ArgumentError where an intensity is not finite: no grey stands for it.
+    """
+    assert form.bits is not None, "levels are of a .png"
+    white = 2**form.bits - 1
+    height, width = values.shape
+    levels = np.empty(values.shape, np.uint8 if form.bits == 8 else np.uint16)
+    rows = max(1, _PIXELS_A_BLOCK // width)
+    for begin in range(0, height, rows):
+        block = values[begin : begin + rows].astype(np.float64)
+        if not np.isfinite(block).all():
+            row, column = (int(index) for index in np.argwhere(~np.isfinite(block))[0])
+            raise ArgumentError(
+                f"values[{begin + row}, {column}]: {block[row, column]} has no grey level; write a .npy or .pfm to see "
+                "such intensities"
+            )
+        block = np.clip(block, 0.0, 1.0, out=block)
+        encoded = srgb(block) if form.encoding == "srgb" else block
+        levels[begin : begin + rows] = np.rint(white * encoded)
+    return levels
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[BinaryIO]:
+    """A file to write that takes the place of `path` when all went well, by one rename; else `path` is as it was.
+
+    Raises ArgumentError, naming the path, where the system refuses.
+    """
+    target = Path(path)
+    unfinished = target.with_name(f".{target.name[:80]}.{os.getpid()}-{secrets.token_hex(4)}")
+    try:
+        with open(unfinished, "xb") as file:
+            yield file
+        unfinished.replace(target)
+    except OSError as problem:
+        if isinstance(problem, BrokenPipeError):
+            raise
+        raise ArgumentError(f"{target}: cannot be written: {problem.strerror or problem}; choose another place") from None
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+
+
+def _write_png(file: BinaryIO, levels: NDArray[Any], form: ImageFormat) -> None:
+    from PIL import Image, PngImagePlugin
+
+    chunks = PngImagePlugin.PngInfo()
+    assert form.encoding is not None, "a .png has an encoding"
+    chunks.add(b"gAMA", _GAMMA[form.encoding].to_bytes(4, "big"))
+    if form.encoding == "srgb":
+        chunks.add(*_SRGB_CHUNK)
+    Image.fromarray(levels).save(file, format="PNG", pnginfo=chunks)
+
+
+def _write_npy(file: BinaryIO, values: NDArray[Any]) -> None:
+    np.save(file, values, allow_pickle=False)
+
+
+def _write_pfm(file: BinaryIO, values: NDArray[Any]) -> None:
+    height, width = values.shape
+    file.write(f"Pf\n{width} {height}\n-1.0\n".encode())
+    with np.errstate(over="ignore"):
+        file.write(np.ascontiguousarray(values[::-1], dtype="<f4").tobytes())
