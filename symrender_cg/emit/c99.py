@@ -176,6 +176,10 @@ class _Writer:
         self.sight = self._body(self._closure(("d_dot_d", *program.hit)), pixel_places)
         self.constants = self._constants(program.at("frame")) if baked else []
 
+    def word(self, name: str) -> str:
+        """The C expression of a quantity as one floating-point number: the high word of a double-double."""
+        return f"{name}.hi" if self.format[name] == "double_double" else name
+
     @property
     def row_uses_frame(self) -> bool:
         """Whether the row's statements read the frame."""

@@ -26,6 +26,8 @@ _DOUBLE_DOUBLE = frozenset(
     "depth offset_x offset_y image_x image_y alpha rho2 reach row_disc row_mid row_half x_left x_right".split()
 )
 
+_PER_PIXEL = frozenset({"cross_x", "cross_y", "cross_z", "s", "d_dot_d", "facing2"})
+
 
 @dataclass(frozen=True, slots=True)
 class Variant:
@@ -55,7 +57,7 @@ VARIANTS: tuple[Variant, ...] = (
         exact=True,
         float64=frozenset({"x", "y", "from_left", "to_right", "facing2", "dx", "dy", "before_eye", "focal", "plane_unit"}),
         double_double=_DOUBLE_DOUBLE,
-        per_pixel_exact=frozenset({"cross_x", "cross_y", "cross_z", "facing2"}),
+        per_pixel_exact=_PER_PIXEL,
     ),
     Variant(
         "literal",
@@ -71,7 +73,7 @@ VARIANTS: tuple[Variant, ...] = (
         _STABLE_FORMS,
         exact=True,
         double_double=_DOUBLE_DOUBLE,
-        per_pixel_exact=frozenset({"cross_x", "cross_y", "cross_z", "facing2"}),
+        per_pixel_exact=_PER_PIXEL,
     ),
 )
 

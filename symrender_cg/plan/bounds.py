@@ -12,8 +12,14 @@ from symrender_cg.scene import Scene
 LARGEST_RATIO = 2.0**200
 """Largest ratio of the distances of eye and centre to the radius: its fifth power is still a float64."""
 
+LARGEST_RATIO_OFF_AXIS = 2.0**50
+"""The same off the axis, where the silhouette's place is a difference: 106 bits then still settle hit or miss to 2^-40."""
+
+LARGEST_RATIO_AT_EYE = 2.0**30
+"""The same for a sphere that reaches the plane of the eye: the sign of m.D is then certain wherever disc's is."""
+
 LARGEST_RATIO_SINGLE = 2.0**60
-"""The same for the kernels that shade in float32."""
+"""The same for kernels that shade in float32: its square is still a float32."""
 
 SMALLEST_LENGTH = 2.0**-900
 LARGEST_LENGTH = 2.0**1000
@@ -44,10 +50,22 @@ def require_supported(scene: Scene) -> None:
             raise OutsidePlanError(
                 f"{place}: {value} is below 2^-900 in the camera's frame; give the scene in another unit of length"
             )
-    if spread(scene) > LARGEST_RATIO:
+    off_axis = sphere.center[0] != 0.0 or sphere.center[1] != 0.0
+    at_eye = eye - sphere.center[2] <= sphere.radius
+    limit = LARGEST_RATIO_AT_EYE if at_eye else LARGEST_RATIO_OFF_AXIS if off_axis else LARGEST_RATIO
+    if (ratio := spread(scene)) > limit:
         raise OutsidePlanError(
-            f"spheres[0].radius: {sphere.radius} is more than 2^200 times smaller than the distance to the eye or than "
-            "the offset of the centre; float64 cannot hold the squares of both"
+            f"spheres[0].radius: {sphere.radius} is {ratio:.3g} times smaller than the distance to the eye or the offset of "
+            f"the centre; kernels for such a sphere are proved right up to {limit:.3g} times"
+        )
+
+
+def require_single(scene: Scene) -> None:
+    """Raises OutsidePlanError where float32 cannot hold the squares that shading in it needs."""
+    if (ratio := spread(scene)) > LARGEST_RATIO_SINGLE:
+        raise OutsidePlanError(
+            f"spheres[0].radius: {scene.spheres[0].radius} is {ratio:.3g} times smaller than the distance to the eye or the "
+            f"offset of the centre; float32 shading reaches {LARGEST_RATIO_SINGLE:.3g} times: use accuracy='double'"
         )
 
 
@@ -55,5 +73,5 @@ def spread(scene: Scene) -> float:
     """The largest of eye distance and centre offset, in radii; infinity where the quotient overflows."""
     sphere = scene.spheres[0]
     longest = max(scene.camera.eye[2], *(abs(c) for c in sphere.center))
-    ratio = longest / sphere.radius if sphere.radius > 1.0 else math.ldexp(longest, -1) / sphere.radius * 2.0
-    return abs(ratio)
+    exponent = math.frexp(longest)[1] - math.frexp(sphere.radius)[1]
+    return math.inf if exponent > 1000 else longest / sphere.radius

@@ -1,0 +1,343 @@
+/* off_axis_sphere_double: one Phong sphere, one point light, accuracy "double" (symrender_cg 0.1.0)
+ * Generated from the formula; do not edit. Regenerate with: python -m symrender_cg build off_axis --accuracy double
+ *
+ * promise  about 1e-15 absolute on ordinary scenes; no overflow; hit or miss never wrong
+ * in       sphere off the axis
+ *          diffuse term
+ *          specular term
+ * out      sphere at the plane of the eye: the sphere lies wholly before the eye: depth of the centre 4.49121 >
+ *          radius 0.875
+ *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
+ *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
+ *          not, diffuse is 0
+ * ops      once: frame 3 mul 3 add 4 div 1 select 43 call
+ *          a row: 4 mul 2 add 18 call
+ *          a pixel: 47 mul 34 add 2 div 2 sqrt 2 max 2 select 1 call
+ */
+#include "off_axis_sphere_double.h"
+
+#include "inline.h"
+#include "span.h"
+#include "units.h"
+#include "phong_power.h"
+#include "double_double.h"
+#include "exact_sign.h"
+#include <math.h>
+
+enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful ones among them are settled */
+
+/* What does not change within a frame. */
+typedef struct {
+    double plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, tilt_frame, diffuse_gain, zero_power,
+        specular_gain, k_ambient, shininess;
+    double_double offset_y, alpha, depth, offset_x, row_mid_frame, row_disc_frame, row_disc_frame_1, row_half_frame,
+        x_left_frame, image_x, image_y;
+} frame;
+
+static frame frame_of(const off_axis_sphere_double_scene *scene)
+{
+    /* units of length, powers of two [8 call] */
+    const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
+    const double plane_unit = ldexp(1, plane_exponent);
+    const int world_exponent = unit_exponent(scene->radius);   /* R 2^k in [1, 2) */
+    const double eye = ldexp(scene->eye, world_exponent);
+    const double radius = ldexp(scene->radius, world_exponent);
+    const double center_x = ldexp(scene->center_x, world_exponent);
+    const double center_y = ldexp(scene->center_y, world_exponent);
+    const double center_z = ldexp(scene->center_z, world_exponent);
+
+    /* light [3 add 3 div 4 call] */
+    const double from_center_x = scene->light_x - scene->center_x;   /* L - C */
+    const double from_center_y = scene->light_y - scene->center_y;
+    const double from_center_z = scene->light_z - scene->center_z;
+    /* farther than 2^60 R a light shines in parallel */
+    const int lamp_exponent = light_exponent(world_exponent, scene->radius, from_center_x, from_center_y,
+        from_center_z, 60);
+    const double lamp_x = ldexp(from_center_x, lamp_exponent) / radius;   /* (L - C) / R */
+    const double lamp_y = ldexp(from_center_y, lamp_exponent) / radius;
+    const double lamp_z = ldexp(from_center_z, lamp_exponent) / radius;
+
+    /* silhouette [31 call] */
+    const double_double offset_y = dd_div(dd_from(center_y), dd_from(radius));
+    const double_double share_2 = dd_difference(center_z, eye);
+    /* disc / R^2 is -alpha x^2 + ... along a row; alpha = kappa^2 - 1 + offset_y^2 > 0 */
+    const double_double alpha = dd_add(dd_mul(offset_y, offset_y),
+        dd_div(dd_mul(dd_add_double(dd_sum(eye, radius), -center_z), dd_sub(dd_from(-radius), share_2)),
+        dd_product(radius, radius)));
+    /* rays D = (x, y, -f): f is e, in the unit of the image plane */
+    const double focal = ldexp(scene->eye, plane_exponent);
+    const double_double depth = dd_neg(dd_div(share_2, dd_from(radius)));   /* the centre seen from the eye, in radii */
+    const double_double offset_x = dd_div(dd_from(center_x), dd_from(radius));
+    const double_double row_mid_frame = dd_mul_double(depth, focal);   /* what is the same for a frame in row_mid */
+    const double_double row_disc_frame = dd_product(focal, focal);   /* what is the same for a frame in row_disc */
+    const double_double share_3 = dd_mul_double(offset_y, focal);
+    const double_double row_disc_frame_1 = dd_neg(share_3);   /* what is the same for a frame in row_disc */
+    /* what is the same for a frame in row_half */
+    const double_double row_half_frame = dd_add(alpha, dd_mul(offset_x, offset_x));
+    const double_double x_left_frame = dd_div(dd_from(1.0), alpha);   /* what is the same for a frame in x_left */
+    /* where the centre appears on the image plane */
+    const double_double image_x = dd_div(dd_mul_double(offset_x, focal), depth);
+    const double_double image_y = dd_div(share_3, depth);
+
+    /* ray and sphere [1 mul] */
+    const double d_dot_d_frame = focal * focal;   /* what is the same for a frame in d_dot_d */
+
+    /* normal [1 div] */
+    const double tilt_frame = 1.0 / focal;   /* what is the same for a frame in tilt */
+
+    /* diffuse [1 mul] */
+    const double diffuse_gain = scene->k_diffuse * scene->light_intensity;   /* I_L k_d */
+
+    /* specular [1 mul 1 select] */
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+    const double specular_gain = scene->k_specular * scene->light_intensity;   /* I_L k_s */
+
+    const frame f = {
+        .plane_unit = plane_unit,
+        .lamp_x = lamp_x,
+        .lamp_y = lamp_y,
+        .lamp_z = lamp_z,
+        .offset_y = offset_y,
+        .alpha = alpha,
+        .focal = focal,
+        .depth = depth,
+        .offset_x = offset_x,
+        .row_mid_frame = row_mid_frame,
+        .row_disc_frame = row_disc_frame,
+        .row_disc_frame_1 = row_disc_frame_1,
+        .row_half_frame = row_half_frame,
+        .x_left_frame = x_left_frame,
+        .image_x = image_x,
+        .image_y = image_y,
+        .d_dot_d_frame = d_dot_d_frame,
+        .tilt_frame = tilt_frame,
+        .diffuse_gain = diffuse_gain,
+        .zero_power = zero_power,
+        .specular_gain = specular_gain,
+        .k_ambient = scene->k_ambient,
+        .shininess = scene->shininess,
+    };
+    return f;
+}
+
+/* What does not change within a row. */
+typedef struct {
+    double y, s_row, tilt_row, n_y_row, n_z_row;
+    double_double x_left, x_right;
+} row;
+
+SYMRENDER_INLINE row row_of(double y, const frame *f)
+{
+    /* silhouette [18 call] */
+    /* alpha times the span's middle */
+    const double_double row_mid = dd_mul(f->offset_x, dd_add(dd_mul_double(f->offset_y, y), f->row_mid_frame));
+    /* positive where the plane through eye and row cuts the sphere */
+    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->row_disc_frame),
+        dd_mul(dd_add(dd_mul_double(f->depth, y), f->row_disc_frame_1),
+        dd_add(dd_mul_double(f->depth, y), f->row_disc_frame_1)));
+    /* alpha times half the span's length */
+    const double_double row_half = dd_sqrt(dd_positive_part(dd_mul(row_disc, f->row_half_frame)));
+    /* the row's hits are x_left <= x <= x_right */
+    const double_double x_left = dd_mul(dd_sub(row_mid, row_half), f->x_left_frame);
+    const double_double x_right = dd_mul(dd_add(row_mid, row_half), f->x_left_frame);
+
+    /* ray and sphere [1 mul] */
+    const double s_row = y * y;   /* what is the same for a row in s */
+
+    /* normal [3 mul 2 add] */
+    const double dy = y - f->image_y.hi - f->image_y.lo;
+    const double tilt_row = f->image_x.hi * dy;   /* what is the same for a row in tilt */
+    const double n_y_row = f->focal * dy;   /* what is the same for a row in n_y */
+    const double n_z_row = y * dy;   /* what is the same for a row in n_z */
+
+    const row r = {.y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row, .tilt_row = tilt_row, .n_y_row = n_y_row, .n_z_row = n_z_row};
+    return r;
+}
+
+/* Does the ray through (x, y) hit? Settled without rounding, as the sign of a polynomial in the inputs. */
+static int hits_exactly(double x, double y, const off_axis_sphere_double_scene *scene)
+{
+    exact_sum sum;
+    exact_sum_clear(&sum);   /* disc */
+    exact_sum_add_product(&sum, -1, scene->center_x, scene->center_x, scene->eye, scene->eye);
+    exact_sum_add_product(&sum, -1, scene->center_x, scene->center_x, y, y);
+    exact_sum_add_product(&sum,  2, scene->center_x, scene->center_y, x, y);
+    exact_sum_add_product(&sum, -2, scene->center_x, scene->center_z, scene->eye, x);
+    exact_sum_add_product(&sum,  2, scene->center_x, scene->eye, scene->eye, x);
+    exact_sum_add_product(&sum, -1, scene->center_y, scene->center_y, scene->eye, scene->eye);
+    exact_sum_add_product(&sum, -1, scene->center_y, scene->center_y, x, x);
+    exact_sum_add_product(&sum, -2, scene->center_y, scene->center_z, scene->eye, y);
+    exact_sum_add_product(&sum,  2, scene->center_y, scene->eye, scene->eye, y);
+    exact_sum_add_product(&sum, -1, scene->center_z, scene->center_z, x, x);
+    exact_sum_add_product(&sum, -1, scene->center_z, scene->center_z, y, y);
+    exact_sum_add_product(&sum,  2, scene->center_z, scene->eye, x, x);
+    exact_sum_add_product(&sum,  2, scene->center_z, scene->eye, y, y);
+    exact_sum_add_product(&sum,  1, scene->eye, scene->eye, scene->radius, scene->radius);
+    exact_sum_add_product(&sum, -1, scene->eye, scene->eye, x, x);
+    exact_sum_add_product(&sum, -1, scene->eye, scene->eye, y, y);
+    exact_sum_add_product(&sum,  1, scene->radius, scene->radius, x, x);
+    exact_sum_add_product(&sum,  1, scene->radius, scene->radius, y, y);
+    return exact_sum_sign(&sum) >= 0;
+}
+
+/* How surely facing2, the discriminant in radii, has the right sign: it has if this is positive. Its error is far below
+ * 2^-40 |D|^2 for every scene that the plan admits; within that, and where it is NaN, hits_exactly decides. */
+static inline double certainty(double facing2, double d_dot_d)
+{
+    return fabs(facing2) - 0x1p-40 * d_dot_d;
+}
+
+/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
+static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
+    const off_axis_sphere_double_scene *scene)
+{
+    const double x = column * step;
+
+    /* ray and sphere [3 mul 6 add] */
+    /* distance to the two ends of the span, not negative inside it */
+    const double from_left = x - r->x_left.hi - r->x_left.lo;
+    const double to_right = r->x_right.hi - x + r->x_right.lo;
+    /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
+    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double d_dot_d = s + f->d_dot_d_frame;
+
+    return certainty(facing2, d_dot_d) > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+}
+
+/* Intensity of the sphere along the ray through x of this row, and in *sure how surely the ray hits or misses:
+ * the sign of *sight says which. */
+SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double *sight, double *sure)
+{
+    /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
+    /* distance to the two ends of the span, not negative inside it */
+    const double from_left = x - r->x_left.hi - r->x_left.lo;
+    const double to_right = r->x_right.hi - x + r->x_right.lo;
+    /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
+    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double d_dot_d = s + f->d_dot_d_frame;
+    const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
+
+    /* normal [15 mul 9 add 1 div] */
+    const double inv_d2 = 1.0 / d_dot_d;
+    const double dx = x - f->image_x.hi - f->image_x.lo;   /* the pixel seen from the image of the centre */
+    const double tilt = f->tilt_frame * (r->tilt_row - dx * f->image_y.hi);
+    /* the foot point (D x (D x m)) / |D|^2 lies on the ray, nearest to the centre; n is it less facing D / |D|^2 */
+    const double n_x = inv_d2 * (f->depth.hi * (f->focal * dx - r->y * tilt) - x * facing);
+    const double n_y = inv_d2 * (f->depth.hi * (x * tilt + r->n_y_row) - r->y * facing);
+    const double n_z = inv_d2 * (f->focal * facing + f->depth.hi * (x * dx + r->n_z_row));
+
+    /* light [7 mul 7 add 1 div 1 sqrt] */
+    const double w_x = f->lamp_x - n_x;   /* w = (L - P) / R */
+    const double w_y = f->lamp_y - n_y;
+    const double w_z = f->lamp_z - n_z;
+    const double w2 = w_x * w_x + w_y * w_y + w_z * w_z;   /* |w|^2 */
+    const double inv_w2 = 1.0 / w2;
+    const double n_dot_l = (n_x * w_x + n_y * w_y + n_z * w_z) * sqrt(inv_w2);   /* n.l = n.w / |w| */
+
+    /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
+    const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
+
+    /* specular [21 mul 10 add 1 select 1 call]. Phong 1975, Illumination for computer generated pictures */
+    const double bounce = 2.0 * facing;
+    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
+    const double mirror_x = x + n_x * bounce;
+    const double mirror_y = r->y + n_y * bounce;
+    const double mirror_z = n_z * bounce - f->focal;
+    const double w_dot_mirror = w_x * mirror_x + w_y * mirror_y + w_z * mirror_z;   /* r.v = w . mirror / (|w| |D|) */
+    const double inv_w2_d2 = inv_d2 * inv_w2;
+    const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
+    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
+    const double side_y = w_z * mirror_x - w_x * mirror_z;
+    const double side_z = w_x * mirror_y - w_y * mirror_x;
+    /* 1 - (r.v)^2, accurate where r.v is near 1 */
+    const double sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
+    const double highlight = power_of_cosine(cos2, sin2, f->shininess);   /* max(0, r.v)^n where r.v > 0 */
+    /* k_s max(0, r.v)^n */
+    const double specular = (w_dot_mirror > 0.0 ? highlight : f->zero_power) * f->specular_gain;
+
+    /* intensity [2 add 1 select]. Phong 1975, Illumination for computer generated pictures */
+    const double lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
+    const double value = f->k_ambient + (w2 > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
+
+    *sight = facing2;
+    *sure = certainty(facing2, d_dot_d);
+    return value;
+}
+
+static inline double at_most(double intensity, double white)
+{
+    return intensity > white ? white : intensity;
+}
+
+void off_axis_sphere_double_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
+    const off_axis_sphere_double_scene *scene, int row_begin, int row_end)
+{
+    const frame f = frame_of(scene);
+    const double unit = f.plane_unit;
+    const double pixel = grid->pixel, step = pixel * unit;
+    const double left = 0.5 - 0.5 * grid->width, top = 0.5 * grid->height - 0.5;
+    const double white = grid->white;
+    const double background = at_most(scene->background, white);
+    const int width = grid->width;
+
+    for (int j = row_begin; j < row_end; ++j) {
+        double *restrict out = image + j * stride;
+        const double plane_y = (top - j) * pixel;
+        const row r = row_of(plane_y * unit, &f);
+
+        /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
+        const double left_end = r.x_left.hi / step - left, right_end = r.x_right.hi / step - left;
+        pixel_span hits = span_between(left_end, right_end, width);
+        while (hits.first > 0 && is_hit(hits.first - 1 + left, plane_y, &r, &f, pixel, step, scene))
+            --hits.first;
+        while (hits.last < width - 1 && is_hit(hits.last + 1 + left, plane_y, &r, &f, pixel, step, scene))
+            ++hits.last;
+        while (hits.first <= hits.last && !is_hit(hits.first + left, plane_y, &r, &f, pixel, step, scene))
+            ++hits.first;
+        while (hits.last >= hits.first && !is_hit(hits.last + left, plane_y, &r, &f, pixel, step, scene))
+            --hits.last;
+
+        const int begin = hits.first <= hits.last ? hits.first : width;
+        const int end = hits.first <= hits.last ? hits.last + 1 : width;
+        for (int i = 0; i < begin; ++i)
+            out[i] = background;
+        for (int i = begin; i < end; ++i) {
+            double sight, sure;
+            out[i] = at_most(shade((i + left) * step, &r, &f, &sight, &sure), white);
+        }
+        for (int i = end; i < width; ++i)
+            out[i] = background;
+    }
+}
+
+void off_axis_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count, double white_limit,
+    const off_axis_sphere_double_scene *scene)
+{
+    const frame f = frame_of(scene);
+    const double unit = f.plane_unit;
+    const double white = white_limit;
+    const double background = at_most(scene->background, white);
+
+    for (ptrdiff_t block = 0; block < count; block += POINTS) {
+        const int length = count - block < POINTS ? (int)(count - block) : POINTS;
+        const double *restrict block_x = x + block, *restrict block_y = y + block;
+        double *restrict out = values + block;
+        double doubt[POINTS];
+        for (int i = 0; i < length; ++i) {
+            const row r = row_of(block_y[i] * unit, &f);
+            double sight, sure;
+            const double intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
+            out[i] = at_most(sight > 0.0 ? intensity : background, white);
+            doubt[i] = sure;
+        }
+        for (int i = 0; i < length; ++i)
+            if (!(doubt[i] > 0.0)) {
+                const row r = row_of(block_y[i] * unit, &f);
+                double sight, sure;
+                const double intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
+                out[i] = at_most(hits_exactly(block_x[i], block_y[i], scene) ? intensity : background, white);
+            }
+    }
+}

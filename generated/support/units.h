@@ -1,0 +1,22 @@
+/* Units of length that are powers of two: changing to them is exact, and in them no square overflows. */
+#ifndef SYMRENDER_UNITS_H
+#define SYMRENDER_UNITS_H
+
+#include <math.h>
+
+/* The k for which length 2^k lies in [1, 2); length > 0. */
+static inline int unit_exponent(double length)
+{
+    return -ilogb(length);
+}
+
+/* The k by which a light at (x, y, z) from the centre is scaled: the scene's own, unless the light is then still farther
+ * than 2^farthest radii. Such a light shines in parallel to the last bit, and is brought to about that distance. */
+static inline int light_exponent(int scene, double radius, double x, double y, double z, int farthest)
+{
+    const double longest = fmax(fmax(fabs(x), fabs(y)), fmax(fabs(z), radius));
+    const int nearer = farthest - ilogb(longest);
+    return nearer < scene ? nearer : scene;
+}
+
+#endif
