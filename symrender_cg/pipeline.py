@@ -162,7 +162,7 @@ def translate(
 def build_kernel(
     translation: Translation, *, portable: bool = False, root: Path | None = None, recipe: str | None = None
 ) -> CachedKernel:
-    """The compiled library of a translation, from the cache where it is there; remembered under a recipe if one is given."""
+    """The compiled library of a translation, from the cache where it is there; remembered under `recipe`, if given."""
     store = Cache(root if root is not None else default_root())
     emitted = translation.emitted
     cached = store.kernel(emitted.files, emitted.cdef, portable=portable)
@@ -174,7 +174,7 @@ def build_kernel(
 
 
 def recipe_of(scene_plan: Plan, accuracy: str, baked: Iterable[tuple[str, float]], portable: bool) -> str:
-    """What determines the C text of a kernel, without deriving it: the compiler's own version, the plan, the variant."""
+    """What determines a kernel's C text, without deriving it: the version of this compiler, the plan, the variant."""
     exact = [(name, value.hex()) for name, value in baked]
     reasons = [f"{d.effect.name}: {d.reason}" for d in scene_plan.decisions] if exact else []
     return json.dumps([VERSION, _source_digest(), scene_plan.key, reasons, accuracy, exact, portable])

@@ -100,9 +100,14 @@ def _centred_span(_: ImageProgram) -> tuple[Definition, ...]:
         Definition("focal", eye, _SILHOUETTE, "rays D = (x, y, -f): f is e, in the unit of the image plane"),
         Definition("depth", eye / radius, _SILHOUETTE, "kappa = e / R: lengths of the scene in radii"),
         Definition(
-            "alpha", (eye - radius) * (eye + radius) / radius**2, _SILHOUETTE, "alpha = kappa^2 - 1, free of cancellation"
+            "alpha",
+            (eye - radius) * (eye + radius) / radius**2,
+            _SILHOUETTE,
+            "alpha = kappa^2 - 1, free of cancellation",
         ),
-        Definition("rho2", focal**2 / alpha, _SILHOUETTE, "the silhouette is the circle x^2 + y^2 = rho^2 = f^2 / alpha"),
+        Definition(
+            "rho2", focal**2 / alpha, _SILHOUETTE, "the silhouette is the circle x^2 + y^2 = rho^2 = f^2 / alpha"
+        ),
         Definition("reach", sp.sqrt(rho2 - y**2), _SILHOUETTE, "the row's hits are -reach <= x <= reach"),
         Definition("x_left", -reach, _SILHOUETTE),
         Definition("x_right", reach, _SILHOUETTE),
@@ -199,7 +204,7 @@ def _any_sphere_claims() -> tuple[Claim, ...]:
     return (*_facing_claims(), Claim(S("before_eye") * S("radius"), S("m_dot_d")))
 
 
-# ----------------------------------------------------------------------------------------- the normal from the foot point
+# --------------------------------------------------------------------------------- the normal from the foot point
 
 _NORMAL = "normal"
 _FOOT = "the foot point (D x (D x m)) / |D|^2 lies on the ray, nearest to the centre; n is it less facing D / |D|^2"
@@ -216,9 +221,7 @@ def _centred_normal(_: ImageProgram) -> tuple[Definition, ...]:
         Definition("along", (depth * focal - facing) * inv_d2, _NORMAL, "t / R: n = (t x, t y, e (1 - t)) / R"),
         Definition("n_x", x * along, _NORMAL),
         Definition("n_y", y * along, _NORMAL),
-        Definition(
-            "n_z", (depth * S("s") + focal * facing) * inv_d2, _NORMAL, "a sum, where e (1 - t) would cancel"
-        ),
+        Definition("n_z", (depth * S("s") + focal * facing) * inv_d2, _NORMAL, "a sum, where e (1 - t) would cancel"),
     )
 
 
@@ -254,7 +257,7 @@ def _normal_claims() -> tuple[Claim, ...]:
     return tuple(Claim(S(f"n_{axis}"), S(f"n_{axis}"), given=root, keep=("facing",)) for axis in "xyz")
 
 
-# --------------------------------------------------------------------------------------------------- light and highlight
+# ---------------------------------------------------------------------------------------- light and highlight
 
 _LIGHT = "light"
 _SPECULAR = "specular"
@@ -277,7 +280,9 @@ def _light_in_radii(program: ImageProgram) -> tuple[Definition, ...]:
             for axis in "xyz"
         ),
         *(
-            Definition(f"w_{axis}", S(f"lamp_{axis}") - S(f"n_{axis}"), _LIGHT, "w = (L - P) / R" if axis == "x" else "")
+            Definition(
+                f"w_{axis}", S(f"lamp_{axis}") - S(f"n_{axis}"), _LIGHT, "w = (L - P) / R" if axis == "x" else ""
+            )
             for axis in "xyz"
         ),
         Definition("w2", w.dot(w), _LIGHT, "|w|^2"),
@@ -296,15 +301,14 @@ def _light_claims() -> tuple[Claim, ...]:
     return (
         *(Claim(S(f"w_{axis}") * radius, S(f"w_{axis}"), given=hit, keep=normal) for axis in "xyz"),
         Claim(S("w2") * radius**2, S("w_length") ** 2, given=w, keep=("w_x", "w_y", "w_z")),
-        Claim(
-            S("n_dot_l"), S("n_dot_l"), given=w | length | same, keep=(*normal, "w_x", "w_y", "w_z", "inv_w2")
-        ),
+        Claim(S("n_dot_l"), S("n_dot_l"), given=w | length | same, keep=(*normal, "w_x", "w_y", "w_z", "inv_w2")),
     )
 
 
 class CosinePower(sp.Function):  # type: ignore[misc]
-    """CosinePower(c, s, n) = c^(n/2), for c = cos^2 of an angle and s = sin^2 of it, given apart: whoever computes it may
-    use 1 - s in place of c where that is the more accurate.
+    """CosinePower(c, s, n) = c^(n/2), for c = cos^2 of an angle and s = sin^2 of it, given apart.
+
+    Whoever computes it may use 1 - s in place of c where that is the more accurate.
     """
 
     nargs = 3
@@ -333,7 +337,9 @@ def _mirrored_ray(program: ImageProgram) -> tuple[Definition, ...]:
         ),
         Definition("w_dot_mirror", w.dot(mirror), _SPECULAR, "r.v = w . mirror / (|w| |D|)"),
         *(
-            Definition(f"side_{axis}", cross[i], _SPECULAR, "w x mirror, short where the highlight is" if i == 0 else "")
+            Definition(
+                f"side_{axis}", cross[i], _SPECULAR, "w x mirror, short where the highlight is" if i == 0 else ""
+            )
             for i, axis in enumerate("xyz")
         ),
         Definition("inv_w2_d2", S("inv_w2") * S("inv_d2"), _SPECULAR),
@@ -344,12 +350,18 @@ def _mirrored_ray(program: ImageProgram) -> tuple[Definition, ...]:
             _SPECULAR,
             "1 - (r.v)^2, accurate where r.v is near 1",
         ),
-        Definition("highlight", CosinePower(S("cos2"), S("sin2"), S("shininess")), _SPECULAR, "max(0, r.v)^n where r.v > 0", program["specular"].source),
         Definition(
-            "zero_power", sp.Piecewise((1, sp.Eq(S("shininess"), 0)), (0, True)), _SPECULAR, "0^n: 1 for n = 0"
+            "highlight",
+            CosinePower(S("cos2"), S("sin2"), S("shininess")),
+            _SPECULAR,
+            "max(0, r.v)^n where r.v > 0",
+            program["specular"].source,
         ),
+        Definition("zero_power", sp.Piecewise((1, sp.Eq(S("shininess"), 0)), (0, True)), _SPECULAR, "0^n: 1 for n = 0"),
         Definition("specular_gain", S("light_intensity") * S("k_specular"), _SPECULAR, "I_L k_s"),
-        Definition("specular", S("specular_gain") * lobe, _SPECULAR, program["specular"].meaning, program["specular"].source),
+        Definition(
+            "specular", S("specular_gain") * lobe, _SPECULAR, program["specular"].meaning, program["specular"].source
+        ),
     )
 
 
@@ -360,7 +372,7 @@ def _mirror_claims() -> tuple[Claim, ...]:
     n, w = symbols("n_x n_y n_z"), symbols("w_x w_y w_z")
     given = {f"l_{axis}": S(f"w_{axis}") * length for axis in "xyz"} | {f"n_{axis}": S(f"n_{axis}") for axis in "xyz"}
     given |= {"d_length": 1 / distance, "n_dot_v": S("facing") * distance}
-    keep = tuple(str(s) for s in (*n, *w)) + ("facing", "inv_w2", "inv_d2")
+    keep = (*tuple(str(s) for s in (*n, *w)), "facing", "inv_w2", "inv_d2")
     facts = {
         S("facing"): -(n[0] * x + n[1] * y - n[2] * eye),
         S("inv_w2"): 1 / (w[0] ** 2 + w[1] ** 2 + w[2] ** 2),

@@ -39,9 +39,7 @@ def centred(program: ImageProgram) -> ImageProgram:
         if value.is_number or value.is_Symbol or (-value).is_Symbol:
             known[definition.symbol] = value
         else:
-            kept.append(
-                Definition(definition.name, value, definition.section, definition.meaning, definition.source)
-            )
+            kept.append(Definition(definition.name, value, definition.section, definition.meaning, definition.source))
     return program.replacing(tuple(kept))
 
 
@@ -70,7 +68,7 @@ def _ray_and_sphere() -> list[Definition]:
             "disc",
             radius**2 * symbol("d_dot_d") - sum(symbol(f"cross_{axis}") ** 2 for axis in "xyz"),
             section,
-            "disc = R^2 |D|^2 - |m x D|^2, the reduced discriminant of |E + t D - C|^2 = R^2: the ray hits where disc >= 0",
+            "disc = R^2 |D|^2 - |m x D|^2, the reduced discriminant of |E + t D - C|^2 = R^2: a hit where disc >= 0",
             LAGRANGE,
         ),
         Definition("root", sp.sqrt(symbol("disc")), section),
@@ -161,7 +159,9 @@ def _specular(*, gated: bool) -> list[Definition]:
             for i, axis in enumerate("xyz")
         ),
         Definition("l_dot_v", light.dot(sp.Matrix(symbols("v_x v_y v_z"))), section, "l.v"),
-        Definition("n_dot_v", symbol("root") / (symbol("radius") * symbol("d_length")), section, "n.v = root / (R |D|)"),
+        Definition(
+            "n_dot_v", symbol("root") / (symbol("radius") * symbol("d_length")), section, "n.v = root / (R |D|)"
+        ),
         Definition(
             "r_dot_v",
             2 * symbol("n_dot_l") * symbol("n_dot_v") - symbol("l_dot_v"),

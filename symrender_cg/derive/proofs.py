@@ -1,8 +1,9 @@
 """Proofs: differences that sympy shows to be 0.
 
-A claim says that a new quantity equals a textbook one. Both are substituted down to what the claim keeps, the numerator of
-their difference is taken, and symbols with a known square (roots, the normal's last component) are reduced, the youngest
-first. What is left is a polynomial: it is 0, or the claim is false. Nothing is tried numerically and nothing is guessed.
+A claim says that a new quantity equals a textbook one. Both are substituted down to what the claim keeps, the
+numerator of their difference is taken, and symbols with a known square (roots, the normal's last component) are
+reduced, the youngest first. What is left is a polynomial: it is 0, or the claim is false. Nothing is tried numerically
+and nothing is guessed.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Invariant:
 
 
 def _reduced(numerator: sp.Expr, root: sp.Symbol, square: sp.Expr) -> sp.Expr:
-    """The numerator as even + root odd, with even powers of the root replaced; free of it where the odd part vanishes."""
+    """The numerator as even + root odd, even powers of the root replaced; free of it where the odd part vanishes."""
     if not numerator.has(root):
         return numerator
     even, odd = sp.Integer(0), sp.Integer(0)
@@ -59,7 +60,7 @@ def prove_form(form: Form, image: ImageProgram) -> tuple[Proof, ...]:
 
 
 def residue(claim: Claim, program: ImageProgram, image: ImageProgram) -> sp.Expr:
-    """What is left of a claim's left side, in the form's program, less its right side, in the textbook's: 0 if it holds."""
+    """A claim's left side, in the form's program, less its right side, in the textbook's: 0 if it holds."""
     new, roots = _substituted(claim.left, program, claim.keep)
     old, old_roots = _substituted(claim.right, image, tuple(claim.given))
     given = {symbol(name): value for name, value in claim.given.items()}
@@ -75,7 +76,7 @@ def residue(claim: Claim, program: ImageProgram, image: ImageProgram) -> sp.Expr
 def _substituted(
     value: sp.Expr, program: ImageProgram, keep: tuple[str, ...]
 ) -> tuple[sp.Expr, dict[sp.Symbol, sp.Expr]]:
-    """A value in the inputs and the kept names; definitions that are square roots stay symbols, and their squares go along."""
+    """A value in inputs and kept names; definitions that are square roots stay symbols, their squares go along."""
     squares: dict[sp.Symbol, sp.Expr] = {}
     for definition in reversed(program.definitions):
         name = definition.symbol

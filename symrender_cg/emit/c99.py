@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import jinja2
-import sympy as sp
 from sympy.codegen.ast import Comment, Declaration, Variable, value_const
 
 from symrender_cg.derive.exact import SignTest
@@ -167,9 +166,9 @@ class _Writer:
         self.row_fields = [(self._type(s), s.name) for s in row if s.name in of_row]
         if "y" in of_row:
             self.row_fields.insert(0, ("double", "y"))
-        self.frame = self._body(program.at("frame"), {name: "scene->" for name in program.inputs})
+        self.frame = self._body(program.at("frame"), dict.fromkeys(program.inputs, "scene->"))
         carried = "" if baked else "f->"
-        frame_places = {name: carried for name in (*program.inputs, *(s.name for s in program.at("frame")))}
+        frame_places = dict.fromkeys((*program.inputs, *(s.name for s in program.at("frame"))), carried)
         self.row = self._body(row, frame_places)
         pixel_places = frame_places | {s.name: "r->" for s in row} | {"y": "r->"}
         self.pixel = self._body(pixel, pixel_places)
@@ -260,7 +259,8 @@ class _Writer:
         if len(lines) == 1 and len(lines[0]) + len(step.meaning) + 9 <= WIDTH:
             return [f"{lines[0]}   /* {step.meaning} */"]
         comment = textwrap.wrap(step.meaning, WIDTH - 12, break_long_words=False)
-        return [f"    /* {comment[0]}", *(f"     * {line}" for line in comment[1:])][:-1] + [
+        return [
+            *[f"    /* {comment[0]}", *(f"     * {line}" for line in comment[1:])][:-1],
             ("    /* " if len(comment) == 1 else "     * ") + comment[-1] + " */",
             *lines,
         ]
@@ -315,7 +315,7 @@ def wrap(statement: str, indent: str) -> list[str]:
     at = max(place for depth, place in breaks if depth == shallowest)
     if at < WIDTH // 3:
         at = max(place for _, place in breaks)
-    return [line[:at].rstrip(), *wrap(line[at:], " " * (len(indent.rstrip("\n")) + 4 if len(indent) == 4 else len(indent)))]
-
-
-
+    return [
+        line[:at].rstrip(),
+        *wrap(line[at:], " " * (len(indent.rstrip("\n")) + 4 if len(indent) == 4 else len(indent))),
+    ]

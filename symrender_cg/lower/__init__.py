@@ -1,1 +1,1 @@
-"""Lower: from an `ImageProgram` to a `KernelProgram`, pass by pass; no pass changes a value beyond the bound it states."""
+"""Lower: from an `ImageProgram` to a `KernelProgram`, by passes that change no value beyond the bound they state."""

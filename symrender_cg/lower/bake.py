@@ -69,9 +69,7 @@ def bake(program: KernelProgram, numbers: Mapping[str, float] | None) -> KernelP
         step if step.rate == "frame" else replace(step, value=_fold(step.value.xreplace(unit | inputs)))
         for step in steps
     ]
-    background = Step(
-        "background", _constant(known[program.background], "float64"), "background", "where no ray hits"
-    )
+    background = Step("background", _constant(known[program.background], "float64"), "background", "where no ray hits")
     return replace(program, steps=(background, *folded), inputs=(), background="background")
 
 

@@ -32,13 +32,14 @@ from symrender_cg.lower.nodes import (
 )
 from symrender_cg.lower.program import Format, KernelProgram, Step
 
+
 def convert_formats(program: KernelProgram) -> KernelProgram:
     """Operands wider than their operation are rounded; double-double ends are subtracted in two exact-order steps.
 
-        float64:  x - x_left      ->  (x - x_left.hi) - x_left.lo
-        float64:  alpha a         ->  alpha.hi a
-        float32:  k_ambient + a   ->  k_ambient_single + a, with k_ambient_single = (float)k_ambient at its own rate
-        int:      ldexp arguments stay as they are
+    float64:  x - x_left      ->  (x - x_left.hi) - x_left.lo
+    float64:  alpha a         ->  alpha.hi a
+    float32:  k_ambient + a   ->  k_ambient_single + a, with k_ambient_single = (float)k_ambient at its own rate
+    int:      ldexp arguments stay as they are
     """
     formats: dict[str, Format] = {step.name: step.format for step in program.steps}
     rates = {step.name: step.rate for step in program.steps} | {"x": "pixel", "y": "row"}
@@ -85,7 +86,8 @@ def _typed(value: sp.Basic, form: Format) -> sp.Basic:
 
 
 def _split(value: sp.Basic, format_of: Callable[[str], Format]) -> sp.Basic:
-    """float64 operations on double-double symbols: the high word, and both words where the symbol is added to a float64."""
+    """float64 operations on double-double symbols: the high word, or both where the symbol is added to a float64."""
+
     def is_wide(a: sp.Basic) -> bool:
         return bool(a.is_Symbol and format_of(a.name) == "double_double")
 

@@ -125,7 +125,8 @@ def frozen(value: sp.Basic, rank: Callable[[sp.Basic], int] = lambda _: 0) -> sp
             return reduce(Both, (go(argument) for argument in sorted(expression.args, key=sp.default_sort_key)))
         if isinstance(expression, sp.StrictLessThan):
             return Greater(go(expression.rhs), go(expression.lhs))
-        assert isinstance(expression, sp.Rel) and expression.rhs == 0, f"cannot freeze {expression}"
+        assert isinstance(expression, sp.Rel), f"cannot freeze {expression}"
+        assert expression.rhs == 0, f"cannot freeze {expression}"
         kinds = {sp.StrictGreaterThan: Positive, sp.GreaterThan: NotNegative, sp.Equality: Zero}
         return kinds[type(expression)](go(expression.lhs))
 

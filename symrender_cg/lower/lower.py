@@ -1,16 +1,16 @@
 """The driver of the passes: an ordered tuple, each timed, counted and checked.
 
-    choose forms    ImageProgram -> KernelProgram     the variant's forms replace the textbook's definitions
-    formats         which quantity is float32, float64 or double-double
-    scale lengths   powers of two, so that no square overflows (exact variants)
-    regularise      every step total
-    lower powers    b^n: a chain of products, or a call
-    place, hoist    frame, row or pixel by the youngest symbol; the slow part of a sum apart
-    share           common subexpressions, format by format
-    freeze          trees of single operations
-    convert         operands rounded to their operation, double-double to calls
-    bake            frame steps to numbers (only when asked)
-    prune, arrange  what nothing uses is left out, sections are brought together
+choose forms    ImageProgram -> KernelProgram     the variant's forms replace the textbook's definitions
+formats         which quantity is float32, float64 or double-double
+scale lengths   powers of two, so that no square overflows (exact variants)
+regularise      every step total
+lower powers    b^n: a chain of products, or a call
+place, hoist    frame, row or pixel by the youngest symbol; the slow part of a sum apart
+share           common subexpressions, format by format
+freeze          trees of single operations
+convert         operands rounded to their operation, double-double to calls
+bake            frame steps to numbers (only when asked)
+prune, arrange  what nothing uses is left out, sections are brought together
 """
 
 from __future__ import annotations
@@ -141,7 +141,9 @@ def _cosine_chain(program: KernelProgram, exponent: int) -> KernelProgram:
             steps.append(step)
             continue
         better = sp.Piecewise((1 - sin2, sp.Rational(1, 2) - sin2 > 0), (cos2, True))
-        steps.append(replace(step, name="lobe", value=better, meaning="(r.v)^2, accurate where r.v is near 1", source=""))
+        steps.append(
+            replace(step, name="lobe", value=better, meaning="(r.v)^2, accurate where r.v is near 1", source="")
+        )
         whole = lobe ** (exponent // 2)
         steps.append(replace(step, value=whole * sp.sqrt(lobe) if exponent % 2 else whole))
     return program.with_steps(steps)

@@ -90,16 +90,14 @@ def scale_lengths(program: KernelProgram) -> KernelProgram:
     others = {s: t for s, t in raw.items() if s.name not in scaled}
     body = [replace(step, value=step.value.xreplace(others)) for step in body]
     inputs = tuple(f"scene_{name}" for name in program.inputs)
-    return replace(
-        program, steps=tuple(head + body), inputs=inputs, background=f"scene_{program.background}"
-    )
+    return replace(program, steps=tuple(head + body), inputs=inputs, background=f"scene_{program.background}")
 
 
 def lower_powers(program: KernelProgram, functions: dict[str, str]) -> KernelProgram:
     """b^n becomes a call, or for a whole number n a chain of products on named steps; x^2 is left to the freeze pass.
 
-        CosinePower(cos2, sin2, n)  ->  power_of_cosine(cos2, sin2, n)
-        max(0, r_dot_v)^3               ->  ..._1 = max(0, r_dot_v); ..._2 = ..._1 ..._1; ..._2 ..._1
+    CosinePower(cos2, sin2, n)  ->  power_of_cosine(cos2, sin2, n)
+    max(0, r_dot_v)^3               ->  ..._1 = max(0, r_dot_v); ..._2 = ..._1 ..._1; ..._2 ..._1
     """
     steps: list[Step] = []
     for step in program.steps:
@@ -248,7 +246,16 @@ def _hoisted(
             stem = f"{step.name}_{word}"
             name = stem if all(s.name != stem for s in slower) else f"{stem}_{len(slower)}"
             known[key] = symbol(name)
-            slower.append(replace(step, name=name, value=expression, rate=word, meaning=f"what is the same for a {word} in {step.name}", source=""))
+            slower.append(
+                replace(
+                    step,
+                    name=name,
+                    value=expression,
+                    rate=word,
+                    meaning=f"what is the same for a {word} in {step.name}",
+                    source="",
+                )
+            )
         return known[key]
 
     here = rate_of(value)

@@ -23,7 +23,10 @@ _STABLE_FORMS = (
 )
 
 _DOUBLE_DOUBLE = frozenset(
-    "depth offset_x offset_y image_x image_y alpha rho2 reach row_disc row_mid row_half x_left x_right".split()
+    {
+        *("depth", "offset_x", "offset_y", "image_x", "image_y", "alpha", "rho2", "reach"),
+        *("row_disc", "row_mid", "row_half", "x_left", "x_right"),
+    }
 )
 
 _PER_PIXEL = frozenset({"cross_x", "cross_y", "cross_z", "s", "d_dot_d", "facing2"})
@@ -55,7 +58,9 @@ VARIANTS: tuple[Variant, ...] = (
         "float32",
         _STABLE_FORMS,
         exact=True,
-        float64=frozenset({"x", "y", "from_left", "to_right", "facing2", "dx", "dy", "before_eye", "focal", "plane_unit"}),
+        float64=frozenset(
+            {"x", "y", "from_left", "to_right", "facing2", "dx", "dy", "before_eye", "focal", "plane_unit"}
+        ),
         double_double=_DOUBLE_DOUBLE,
         per_pixel_exact=_PER_PIXEL,
     ),

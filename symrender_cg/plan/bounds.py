@@ -13,7 +13,7 @@ LARGEST_RATIO = 2.0**200
 """Largest ratio of the distances of eye and centre to the radius: its fifth power is still a float64."""
 
 LARGEST_RATIO_OFF_AXIS = 2.0**50
-"""The same off the axis, where the silhouette's place is a difference: 106 bits then still settle hit or miss to 2^-40."""
+"""The same off the axis, where the silhouette's place is a difference: 106 bits still settle a hit to 2^-40."""
 
 LARGEST_RATIO_AT_EYE = 2.0**30
 """The same for a sphere that reaches the plane of the eye: the sign of m.D is then certain wherever disc's is."""
@@ -42,9 +42,7 @@ def require_supported(scene: Scene) -> None:
     }
     for place, values in places.items():
         if max(abs(value) for value in values) > LARGEST_LENGTH:
-            raise OutsidePlanError(
-                f"{place}: {values} is longer than 2^1000; give the scene in another unit of length"
-            )
+            raise OutsidePlanError(f"{place}: {values} is longer than 2^1000; give the scene in another unit of length")
     for place, value in (("camera.eye", eye), ("spheres[0].radius", sphere.radius)):
         if value < SMALLEST_LENGTH:
             raise OutsidePlanError(
@@ -55,8 +53,8 @@ def require_supported(scene: Scene) -> None:
     limit = LARGEST_RATIO_AT_EYE if at_eye else LARGEST_RATIO_OFF_AXIS if off_axis else LARGEST_RATIO
     if (ratio := spread(scene)) > limit:
         raise OutsidePlanError(
-            f"spheres[0].radius: {sphere.radius} is {ratio:.3g} times smaller than the distance to the eye or the offset of "
-            f"the centre; kernels for such a sphere are proved right up to {limit:.3g} times"
+            f"spheres[0].radius: {sphere.radius} is {ratio:.3g} times smaller than the distance to the eye or the "
+            f"offset of the centre; kernels for such a sphere are proved right up to {limit:.3g} times"
         )
 
 
@@ -64,8 +62,8 @@ def require_single(scene: Scene) -> None:
     """Raises OutsidePlanError where float32 cannot hold the squares that shading in it needs."""
     if (ratio := spread(scene)) > LARGEST_RATIO_SINGLE:
         raise OutsidePlanError(
-            f"spheres[0].radius: {scene.spheres[0].radius} is {ratio:.3g} times smaller than the distance to the eye or the "
-            f"offset of the centre; float32 shading reaches {LARGEST_RATIO_SINGLE:.3g} times: use accuracy='double'"
+            f"spheres[0].radius: {scene.spheres[0].radius} is {ratio:.3g} times smaller than the distance to the eye or "
+            f"the offset of the centre; float32 shading reaches {LARGEST_RATIO_SINGLE:.3g} times: use 'double'"
         )
 
 

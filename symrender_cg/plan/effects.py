@@ -51,7 +51,7 @@ def _front_test(scene: Scene) -> Finding:
     if depth > Fraction(sphere.radius):
         return Finding(
             False,
-            f"the sphere lies wholly before the eye: depth of the centre {float(depth):.6g} > radius {sphere.radius:.6g}",
+            f"the sphere lies wholly before the eye: depth of its centre {float(depth):.6g} > R {sphere.radius:.6g}",
             margin,
         )
     return Finding(

@@ -1,1 +1,1 @@
-"""Run: a loaded kernel and a scene's numbers become an image. Imports no sympy; never compiles for a change of numbers."""
+"""Run: a loaded kernel and a scene's numbers become an image. No sympy; no compile for a change of numbers."""

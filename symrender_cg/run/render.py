@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -35,7 +35,7 @@ def render_image(
     """The image of a scene: linear intensity, shape (height, width), row 0 at the top.
 
     scene      a Scene, a built-in scene's name, a path of a TOML file; none is Chapter 1's scene
-    accuracy   "literal" (the seed's formula), "double" (cancellation-free float64) or "single" (float32, returns float32)
+    accuracy   "literal" (the seed's formula), "double" (cancellation-free float64), "single" (float32, returns it)
     clip       cut to [0, 1] as a picture is; False keeps the field itself, which may exceed 1
     out        array of that shape and dtype to write into; any strides, writable
     threads    threads over rows; any number gives the same bits
@@ -110,8 +110,8 @@ def pixel_size(frame: Scene, height: int) -> float:
 
 
 def _grid(width: int, height: int, pixel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    columns = (np.arange(width) + 0.5 - 0.5 * width) * pixel
-    rows = (0.5 * height - 0.5 - np.arange(height)) * pixel
+    columns = (np.arange(width, dtype=np.float64) + 0.5 - 0.5 * width) * np.float64(pixel)
+    rows = (0.5 * height - 0.5 - np.arange(height, dtype=np.float64)) * np.float64(pixel)
     return columns[np.newaxis, :], rows[:, np.newaxis]
 
 
@@ -123,7 +123,7 @@ def _numpy_backend(
 
     chosen = variant(accuracy)
     dtype: DTypeLike = np.float32 if chosen.shading == "float32" else np.float64
-    form = "stable" if chosen.exact else "literal"
+    form: Literal["stable", "literal"] = "stable" if chosen.exact else "literal"
     values = evaluate_vectorised(frame, x, y, form=form).astype(dtype, copy=False)
     return np.clip(values, 0.0, 1.0) if clip else values
 
@@ -135,7 +135,9 @@ def _require_native(backend: str) -> None:
 
 def _side(name: str, value: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= LARGEST_SIDE:
-        raise ArgumentError(f"{name}: {value!r} is not a number of pixels; expected a whole number from 1 to {LARGEST_SIDE}")
+        raise ArgumentError(
+            f"{name}: {value!r} is not a number of pixels; expected a whole number from 1 to {LARGEST_SIDE}"
+        )
     return int(value)
 
 

@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import pairwise
 
 from symrender_cg.errors import ArgumentError
 
@@ -34,7 +35,7 @@ def over_rows(render: Callable[[int, int], None], height: int, threads: int) -> 
         return
     blocks = min(height, threads * _BLOCKS_A_THREAD)
     ends = [height * k // blocks for k in range(blocks + 1)]
-    futures = [_pool(threads).submit(render, a, b) for a, b in zip(ends, ends[1:], strict=False)]
+    futures = [_pool(threads).submit(render, a, b) for a, b in pairwise(ends)]
     for future in futures:
         future.result()
 

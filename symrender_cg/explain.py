@@ -1,0 +1,214 @@
+"""What a kernel rests on, as data: plan, derivation, chosen forms, proved invariants, silhouette, operations.
+
+Comes in: a Scene and an accuracy. Goes out: Explanation, frozen, of text and numbers: each formula as text and as LaTeX.
+Never done here: printing, compiling, or a formula that is not the derivation's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from symrender_cg.derive import forms
+from symrender_cg.derive.exact import sign_tests
+from symrender_cg.derive.proofs import Invariant, prove_invariants
+from symrender_cg.derive.symbols import INPUTS, latex_names, symbol
+from symrender_cg.pipeline import translate
+from symrender_cg.plan.plan import Decision
+from symrender_cg.run.numbers import numbers_of
+from symrender_cg.scene import Scene
+
+if TYPE_CHECKING:
+    from symrender_cg.pipeline import Translation
+
+CENTRED = "x^2 + y^2 = e^2 R^2 / (e^2 - R^2)"
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One named quantity: its formula as text and as LaTeX, what it means, its source, the section it stands in."""
+
+    name: str
+    formula: str
+    latex_name: str
+    latex: str
+    meaning: str
+    source: str
+    section: str
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenForm:
+    """A form that the accuracy uses: its name, what it removes, its source."""
+
+    name: str
+    removes: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Silhouette:
+    """disc = 0 as a conic a x^2 + b x y + c y^2 + d x + e y + f = 0 in the scene's numbers.
+
+    kind is decided exactly. rho is the radius of the circle for a centred sphere, else None.
+    """
+
+    equation: str
+    coefficients: tuple[float, ...]
+    kind: str
+    rho: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A stage or a pass: seconds, operations before and after it (None where it has none)."""
+
+    name: str
+    seconds: float
+    before: int | None
+    after: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """All of it; `operations` counts the kernel's operations by rate (frame, row, pixel) and kind."""
+
+    kernel: str
+    accuracy: str
+    promise: str
+    decisions: tuple[Decision, ...]
+    inputs: tuple[tuple[str, str, str, float], ...]
+    textbook: tuple[Quantity, ...]
+    guard: tuple[str, ...]
+    forms: tuple[ChosenForm, ...]
+    chosen: tuple[Quantity, ...]
+    invariants: tuple[Invariant, ...]
+    silhouette: Silhouette
+    stages: tuple[Step, ...]
+    passes: tuple[Step, ...]
+    operations: dict[str, dict[str, int]]
+
+
+def explain(scene: Scene, accuracy: str = "double") -> Explanation:
+    """The explanation of the kernel that a scene gets at an accuracy.
+
+    Raises ArgumentError for an unknown accuracy, OutsidePlanError for a scene that no plan covers.
+    """
+    translation = translate(scene, accuracy)
+    plan, variant, image = translation.plan, translation.variant, translation.image
+    numbers = numbers_of(scene)
+    names = _latex_symbols(translation)
+    textbook = tuple(_quantity(d.name, d.value, d.meaning, d.source, d.section, names) for d in image.definitions)
+    own = {(definition.name, definition.value) for definition in image.definitions}
+    first = translation.passes[0].program
+    used = (forms.form(name) for name in variant.forms)
+    fitting = [
+        entry
+        for entry in used
+        if entry.fits(image, off_axis=plan.needs("off_axis"), front_test=plan.needs("front_test"))
+    ]
+    return Explanation(
+        kernel=translation.emitted.name,
+        accuracy=variant.name,
+        promise=variant.promise,
+        decisions=plan.decisions,
+        inputs=tuple(
+            (row.name, row.latex, row.meaning, numbers[row.name]) for row in INPUTS if row.name in translation.emitted.inputs
+        ),
+        textbook=textbook,
+        guard=image.guard,
+        forms=tuple(ChosenForm(entry.name, entry.removes, entry.source) for entry in fitting),
+        chosen=tuple(
+            _quantity(s.name, s.value, s.meaning, s.source, s.section, names)
+            for s in first.steps
+            if (s.name, s.value) not in own
+        ),
+        invariants=prove_invariants(image),
+        silhouette=_silhouette(translation, numbers),
+        stages=_stages(translation),
+        passes=_passes(translation),
+        operations={rate: dict(sorted(counts.items())) for rate, counts in translation.emitted.operations.items()},
+    )
+
+
+def _quantity(
+    name: str, value: sp.Basic, meaning: str, source: str, section: str, names: dict[sp.Symbol, str]
+) -> Quantity:
+    shown = names[symbol(name)]
+    return Quantity(name, str(value), shown, sp.latex(value, symbol_names=names), meaning, source, section)
+
+
+def _latex_symbols(translation: Translation) -> dict[sp.Symbol, str]:
+    """How every symbol of the derivation and of the chosen forms is set; a word is set upright, not as a product."""
+    steps = (*translation.image.definitions, *translation.passes[0].program.steps)
+    found = {symbol(step.name) for step in steps} | {s for step in steps for s in step.value.free_symbols}
+    return {s: _latex_of(s.name) for s in sorted(found, key=str)} | latex_names()
+
+
+def _latex_of(name: str) -> str:
+    head, _, rest = name.partition("_")
+    shown = head if len(head) == 1 else rf"\mathrm{{{head}}}"
+    return shown if not rest else shown + rf"_{{\mathrm{{{rest.replace('_', ' ')}}}}}".replace(" ", r"\,")
+
+
+def _silhouette(translation: Translation, numbers: dict[str, float]) -> Silhouette:
+    """The conic of the exact test of disc, its coefficients in exact rationals, rounded once for display."""
+    test = sign_tests(translation.image)[0]
+    powers = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0))
+    sums = dict.fromkeys(powers, Fraction(0))
+    for monomial in test.monomials:
+        term = Fraction(monomial.coefficient)
+        for factor in monomial.factors:
+            if factor not in ("x", "y"):
+                term *= Fraction(numbers[factor])
+        sums[monomial.factors.count("x"), monomial.factors.count("y")] += term
+    a, b, c, d, e, f = (sums[power] for power in powers)
+    bend = b * b - 4 * a * c
+    kind = "hyperbola" if bend > 0 else "parabola" if bend == 0 else "circle" if b == 0 and a == c else "ellipse"
+    centred = b == d == e == 0 and a == c and not translation.plan.needs("off_axis")
+    return Silhouette(
+        equation=f"{sp.collect(sp.expand(translation.image.closed('disc')), (symbol('x'), symbol('y')))} = 0",
+        coefficients=tuple(_rounded(value) for value in (a, b, c, d, e, f)),
+        kind=kind,
+        rho=_root(-f / a) if centred else None,
+    )
+
+
+def _root(square: Fraction) -> float:
+    """sqrt of a positive rational, to 200 bits and then rounded."""
+    shift = 200 + square.denominator.bit_length()
+    return float(Fraction(isqrt((square.numerator << (2 * shift)) // square.denominator), 1 << shift))
+
+
+def _rounded(value: Fraction) -> float:
+    """The float64 nearest to a rational; an infinity where it is too large for one."""
+    try:
+        return float(value)
+    except OverflowError:
+        return float("inf") if value > 0 else float("-inf")
+
+
+def _stages(translation: Translation) -> tuple[Step, ...]:
+    seconds = translation.seconds
+    named, kernel = translation.image.operations(), sum(translation.program.operations().values())
+    closed = int(sp.count_ops(translation.image.as_piecewise()))
+    return (
+        Step("plan", seconds["plan"], None, None),
+        Step("derive", seconds["derive"], closed, named),
+        Step("lower", seconds["lower"], named, kernel),
+        Step("emit", seconds["emit"], None, None),
+    )
+
+
+def _passes(translation: Translation) -> tuple[Step, ...]:
+    steps = []
+    before = translation.image.operations()
+    for stage in translation.passes:
+        after = sum(stage.operations.values())
+        steps.append(Step(stage.name, stage.seconds, before, after))
+        before = after
+    return tuple(steps)
