@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import statistics
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,6 +31,8 @@ from rich.table import Table
 
 from symrender_cg import Camera, Phong, Scene, Sphere, compile_kernel, evaluate, render_image, translate
 from symrender_cg.derive.symbols import symbol
+from symrender_cg.lower.nodes import Call, walk as nodes_of
+from symrender_cg.lower.program import RATES, operations_of
 from symrender_cg.pipeline import Translation
 from symrender_cg.reference import oracle
 from symrender_cg.reference.compare import measure
@@ -70,10 +74,12 @@ class Lab:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the walk, prints its table, saves the pictures; 0."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("chapter1"), help="folder for the pictures (default: ./chapter1)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("chapter1"), help="folder for the pictures (default: ./chapter1)"
+    )
     parser.add_argument("--size", type=_side, default=256, help="pixels a side of the image (default: 256, the seed's)")
     options = parser.parse_args(argv)
-    console = Console()
+    console = Console() if sys.stdout.isatty() else Console(width=120)
     findings = walk(options.size, options.out, console)
     console.print(report(findings, options.size))
     return 0
@@ -143,7 +149,9 @@ def cell_2(scene: Scene, gallery: Gallery, console: Console) -> tuple[seed_cells
     counts = ", ".join(f"{name} {count:,}" for name, count in swell.items())
     return seed, [
         Finding(2, "swell", "operations of the seed's expressions", "prints a swell table", swell, counts),
-        Finding(2, "named", "the same image as named definitions", "-", named, f"{named} operations, {shared} once shared"),
+        Finding(
+            2, "named", "the same image as named definitions", "-", named, f"{named} operations, {shared} once shared"
+        ),
         Finding(
             2,
             "seconds",
@@ -172,12 +180,23 @@ def cell_3(lab: Lab) -> list[Finding]:
     }
     errors = {name: measure(values, truth) for name, values in images.items()}
     off = {name: np.abs((images[name] - truth.value) - truth.residual) for name in ("per_pixel", "lambdify", "double")}
-    titles = {"per_pixel": "error of the per-pixel loop", "lambdify": "error of the seed's lambdify", "double": "error of `double`"}
+    titles = {
+        "per_pixel": "error of the per-pixel loop",
+        "lambdify": "error of the seed's lambdify",
+        "double": "error of `double`",
+    }
     lab.gallery.difference(np.clip(lab.per_pixel, 0, 1), [(titles[name], off[name]) for name in off], 1e-17)
     return [
         Finding(3, "structural", "max |numeric - symbolic|", "about 1e-15", structural, f"{structural:.1e}"),
         *(
-            Finding(3, f"error_{name}", f"largest error of {title}", "-", error, f"{error.max_abs:.1e} ({error.max_ulp:.0f} ulp)")
+            Finding(
+                3,
+                f"error_{name}",
+                f"largest error of {title}",
+                "-",
+                error,
+                f"{error.max_abs:.1e} ({error.max_ulp:.0f} ulp)",
+            )
             for (name, error), title in zip(
                 errors.items(),
                 ("the loop (Cell 1)", "lambdify (Cell 3)", "numpy (Cell 4)", "our literal", "our double"),
@@ -191,7 +210,9 @@ def cell_4(lab: Lab) -> list[Finding]:
     """Loop, numpy, the seed's lambdify, ours: nanoseconds a pixel, one thread."""
     compiled = seed_cells.cell_3_function(lab.seed, lab.seed.I_img)
     sizes = [size for size in (lab.size // 4, lab.size // 2, lab.size, 2 * lab.size) if size >= 8]
-    rows: dict[str, list[float | None]] = {name: [] for name in ("loop", "numpy", "lambdify", "literal", "double", "single")}
+    rows: dict[str, list[float | None]] = {
+        name: [] for name in ("loop", "numpy", "lambdify", "literal", "double", "single")
+    }
     for side in sizes:
         grid = seed_cells.cell_3_grid(side, side)
         loops = side <= lab.size
@@ -207,10 +228,15 @@ def cell_4(lab: Lab) -> list[Finding]:
     lab.gallery.timings(sizes, rows)
     last = {name: values[-1] or 0.0 for name, values in rows.items() if name != "loop"}
     swollen = last["lambdify"] / last["numpy"]
+    loops = (rows["loop"][0] or 0.0) / (rows["numpy"][0] or 1.0)
     ours = {name: last[name] / last["double"] for name in ("numpy", "lambdify")}
     return [
-        Finding(4, "rows", "loop against numpy", "loop far slower", rows, f"{rows['loop'][0] / rows['numpy'][0]:.0f} times"),  # type: ignore[operator]
-        Finding(4, "swollen", "the seed's lambdify against numpy", "about as fast", swollen, f"{swollen:.1f} times slower"),
+        Finding(
+            4, "rows", "loop against numpy", "loop far slower", rows, f"{loops:.0f} times, {sizes[0]} x {sizes[0]}"
+        ),
+        Finding(
+            4, "swollen", "the seed's lambdify against numpy", "about as fast", swollen, f"{swollen:.1f} times slower"
+        ),
         Finding(
             4,
             "ours",
@@ -233,7 +259,9 @@ def cell_5(lab: Lab) -> list[Finding]:
     lab.gallery.silhouette(image, rho)
     return [
         Finding(5, "rho", "rho at e = 4, R = 1", "4/sqrt(15) = 1.0327955589886444", rho, repr(rho)),
-        Finding(5, "misplaced", "pixels on the wrong side of it", "-", wrong, f"{wrong} of {image.size:,}, decided exactly"),
+        Finding(
+            5, "misplaced", "pixels on the wrong side of it", "-", wrong, f"{wrong} of {image.size:,}, decided exactly"
+        ),
     ]
 
 
@@ -254,7 +282,14 @@ def cell_7(lab: Lab) -> list[Finding]:
     misses = int(np.count_nonzero(~oracle.hits(lab.scene, lab.x, lab.y)))
     lab.gallery.heaviside(np.clip(bad, 0, 1), np.clip(good, 0, 1), piecewise)
     return [
-        Finding(7, "nan_raw", "nan in H(disc) I_shade", "tens of thousands", nans, f"{nans:,} of {bad.size:,}; {misses:,} misses"),
+        Finding(
+            7,
+            "nan_raw",
+            "nan in H(disc) I_shade",
+            "tens of thousands",
+            nans,
+            f"{nans:,} of {bad.size:,}; {misses:,} misses",
+        ),
         Finding(7, "nan_regularised", "nan once sqrt(max(0, disc))", "0", left, str(left)),
         Finding(7, "as_the_seed_compares", "equal, unclipped against clipped", "True", as_compared, str(as_compared)),
         Finding(7, "both_clipped", "equal, both clipped", "-", both_clipped, str(both_clipped)),
@@ -269,7 +304,7 @@ def cell_8(lab: Lab) -> list[Finding]:
     wrong: dict[str, tuple[int, int]] = {}
     for title, center, radius in TWO_SPHERES:
         image, naive_wrong, ordered_wrong = _two_spheres(lab, naive, arguments, center, radius)
-        shown.append((title, image, naive_wrong, ordered_wrong))
+        shown.append((f"B {title}", image, naive_wrong, ordered_wrong))
         wrong[title] = (int(naive_wrong.sum()), int(ordered_wrong.sum()))
     lab.gallery.two_spheres(shown)
     return [
@@ -277,9 +312,10 @@ def cell_8(lab: Lab) -> list[Finding]:
             8,
             title,
             f"wrong pixels, B {title}",
-            "naive: ignores occlusion order" if title == "behind A" else "-",
+            SEED_ON_ORDER if title == "behind A" else "-",
             counts,
-            f"Cell 8 {counts[0]:,}; sorted by power of the eye {counts[1]:,}",
+            f"Cell 8 {counts[0]:,}; sorted by power of the eye {counts[1]:,}"
+            + (" (they intersect: compare depths)" if title == "through A" else ""),
         )
         for title, counts in wrong.items()
     ]
@@ -294,6 +330,7 @@ CELLS: dict[str, Callable[[Lab], list[Finding]]] = {
     "8  two spheres": cell_8,
 }
 
+SEED_ON_ORDER = "naive: ignores occlusion order"
 TWO_SPHERES = (("in front", 1.8, 0.35), ("behind A", -2.5, 1.3), ("behind the eye", 6.0, 0.6), ("through A", 0.5, 0.62))
 """title, centre on the z axis and radius of sphere B; A is the seed's"""
 
@@ -315,7 +352,9 @@ def _derivative(lab: Lab) -> list[Finding]:
     slope = differentiate(program, "light_x")
     values = evaluate_by_name(slope, {**numbers_of(lab.scene), "x": lab.x, "y": lab.y})
     field = seed_cells.cell_6_derivative(lab.seed)
-    unclamped = np.where(oracle.hits(lab.scene, lab.x, lab.y), seed_cells.cell_3_function(lab.seed, field)(lab.x, lab.y), 0)
+    unclamped = np.where(
+        oracle.hits(lab.scene, lab.x, lab.y), seed_cells.cell_3_function(lab.seed, field)(lab.x, lab.y), 0
+    )
     step = 2.0**-18
     beside = [evaluate(Scene.chapter1(light=(5.0 + sign * step, 5.0, 10.0)), lab.x, lab.y) for sign in (1, -1)]
     central = (beside[0] - beside[1]) / (2 * step)
@@ -341,20 +380,51 @@ def _derivative(lab: Lab) -> list[Finding]:
 def _baking(lab: Lab) -> list[Finding]:
     swollen = int(lab.seed.I_img.count_ops())
     folded = int(seed_cells.cell_6_baked(lab.seed).count_ops())
-    counts = []
-    for bake in (False, True):
-        operations = translate(lab.scene, "double", bake=bake).emitted.operations
-        counts.append({rate: sum(kinds.values()) for rate, kinds in operations.items()})
-    plain, baked = (" + ".join(f"{count[rate]} a {rate}" for rate in ("frame", "row", "pixel")) for count in counts)
-    times = [_ns_of_kernel(lab.scene, 2 * lab.size, "double", bake=bake) for bake in (False, True)]
+    counts = [_work(translate(lab.scene, "double", bake=bake)) for bake in (False, True)]
+    side = 2 * lab.size
+    times = [_ns_of_kernel(lab.scene, side, "double", bake=bake) for bake in (False, True)]
     images = [render_image(lab.scene, lab.size, lab.size, bake=bake, clip=False) for bake in (False, True)]
     change = float(np.abs(images[0] - images[1]).max())
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        compile_kernel(lab.scene, bake=True, cache=folder)
+        cost = time.perf_counter() - start
+    saved = times[0] - times[1]
+    pays = f"after {cost / saved * 1e3:,.0f} million pixels" if saved > 0 else "never, on this run"
     return [
-        Finding(6, "seed_baked", "operations, seed's image baked", "slightly fewer", (swollen, folded), f"{swollen:,} -> {folded:,}"),
-        Finding(6, "baked", "operations, our double", "-", counts, f"{plain} -> {baked}"),
-        Finding(6, "baked_ns", "ns a pixel, our double", "-", times, f"{times[0]:.2f} -> {times[1]:.2f}"),
-        Finding(6, "baked_change", "largest change of the image by baking", "matches", change, f"{change:.1e}"),
+        Finding(
+            6,
+            "seed_baked",
+            "operations of the seed's image, baked",
+            "slightly fewer",
+            (swollen, folded),
+            f"{swollen:,} -> {folded:,}",
+        ),
+        *(
+            Finding(
+                6, f"work_{rate}", f"operations of our double, a {rate}", "-", (before, after), f"{before} -> {after}"
+            )
+            for rate, before, after in zip(counts[0], counts[0].values(), counts[1].values(), strict=True)
+        ),
+        Finding(6, "baked_ns", f"its ns a pixel, {side} x {side}", "-", times, f"{times[0]:.2f} -> {times[1]:.2f}"),
+        Finding(6, "baked_cost", "deriving and compiling it again", "-", cost, f"{cost:.2f} s: pays {pays}"),
+        Finding(6, "baked_change", "change of the image by baking", "none to 1e-12", change, f"at most {change:.1e}"),
     ]
+
+
+def _work(translation: Translation) -> dict[str, str]:
+    """Operations at each rate, powers b^n apart, for they cost as much as the rest together."""
+    counts = {}
+    for rate in RATES:
+        steps = translation.program.at(rate)
+        total = sum(sum(operations_of(step).values()) for step in steps)
+        powers = sum(
+            isinstance(node, Call) and node.function.startswith("power")
+            for step in steps
+            for node in nodes_of(step.value)
+        )
+        counts[rate] = f"{total - powers} and a power" if powers else str(total)
+    return counts
 
 
 def _two_spheres(

@@ -95,7 +95,7 @@ class Gallery:
             left = bottom = rho * np.sqrt(0.5) - side / 2
             whole.add_patch(Rectangle((left, bottom), side, side, fill=False, ec=BLUE, lw=1))
             near.set(xlim=(left, left + side), ylim=(bottom, bottom + side))
-            whole.set_title(rf"$x^2+y^2=\rho^2$, $\rho$ = {rho:.16g}", fontsize=9)
+            whole.set_title(rf"$x^2+y^2=\rho^2$, $\rho$ = {rho!r}", fontsize=9)
             near.set_title("16 by 16 pixels of it", fontsize=9)
             for axes in (whole, near):
                 axes.tick_params(labelsize=7)

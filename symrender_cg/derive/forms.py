@@ -124,20 +124,22 @@ def _off_axis_span(_: ImageProgram) -> tuple[Definition, ...]:
     row_disc, row_mid, row_half = symbols("row_disc row_mid row_half")
     return (
         Definition("focal", eye, _SILHOUETTE, "rays D = (x, y, -f): f is e, in the unit of the image plane"),
-        Definition("depth", (eye - center_z) / radius, _SILHOUETTE, "the centre seen from the eye, in radii"),
+        Definition("distance", eye - center_z, _SILHOUETTE, "of the eye from the plane of the centre"),
+        Definition("depth", S("distance") / radius, _SILHOUETTE, "kappa: the same in radii"),
         Definition("offset_x", center_x / radius, _SILHOUETTE),
         Definition("offset_y", center_y / radius, _SILHOUETTE),
         Definition("image_x", offset_x * focal / depth, _SILHOUETTE, "where the centre appears on the image plane"),
         Definition("image_y", offset_y * focal / depth, _SILHOUETTE),
         Definition(
             "alpha",
-            (eye - center_z - radius) * (eye - center_z + radius) / radius**2 + offset_y**2,
+            (S("distance") - radius) * (S("distance") + radius) / radius**2 + offset_y**2,
             _SILHOUETTE,
             "disc / R^2 is -alpha x^2 + ... along a row; alpha = kappa^2 - 1 + offset_y^2 > 0",
         ),
+        Definition("row_gap", depth * y - offset_y * focal, _SILHOUETTE, "by how much the row misses the centre"),
         Definition(
             "row_disc",
-            y**2 + focal**2 - (depth * y - offset_y * focal) ** 2,
+            y**2 + focal**2 - S("row_gap") ** 2,
             _SILHOUETTE,
             "positive where the plane through eye and row cuts the sphere",
         ),
@@ -181,7 +183,8 @@ def _any_sphere(_: ImageProgram) -> tuple[Definition, ...]:
     depth, offset_x, offset_y = symbols("depth offset_x offset_y")
     return (
         Definition("focal", eye, _RAY, "rays D = (x, y, -f): f is e, in the unit of the image plane"),
-        Definition("depth", (eye - center_z) / radius, _RAY, "the centre seen from the eye, in radii"),
+        Definition("distance", eye - center_z, _RAY, "of the eye from the plane of the centre"),
+        Definition("depth", S("distance") / radius, _RAY, "kappa: the same in radii"),
         Definition("offset_x", center_x / radius, _RAY),
         Definition("offset_y", center_y / radius, _RAY),
         Definition("s", x**2 + y**2, _RAY, "s = x^2 + y^2, A = |D|^2 = s + f^2"),

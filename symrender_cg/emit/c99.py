@@ -191,8 +191,9 @@ class _Writer:
 
     @property
     def row_inits(self) -> list[str]:
-        """Initialisers of the row structure."""
-        return [f".{name} = {name}" for _, name in self.row_fields]
+        """Initialisers of the row structure, in lines."""
+        inits = ", ".join(f".{name} = {name}" for _, name in self.row_fields)
+        return textwrap.wrap(inits + ",", WIDTH - 10, break_long_words=False)
 
     @property
     def frame_inits(self) -> list[str]:
@@ -258,12 +259,9 @@ class _Writer:
             return lines
         if len(lines) == 1 and len(lines[0]) + len(step.meaning) + 9 <= WIDTH:
             return [f"{lines[0]}   /* {step.meaning} */"]
-        comment = textwrap.wrap(step.meaning, WIDTH - 12, break_long_words=False)
-        return [
-            *[f"    /* {comment[0]}", *(f"     * {line}" for line in comment[1:])][:-1],
-            ("    /* " if len(comment) == 1 else "     * ") + comment[-1] + " */",
-            *lines,
-        ]
+        first, *rest = textwrap.wrap(step.meaning, WIDTH - 12, break_long_words=False)
+        comment = [f"    /* {first}", *(f"     * {line}" for line in rest)]
+        return [*comment[:-1], comment[-1] + " */", *lines]
 
     def _constants(self, steps: Sequence[Step]) -> list[str]:
         lines = []

@@ -25,7 +25,7 @@ _STABLE_FORMS = (
 _DOUBLE_DOUBLE = frozenset(
     {
         *("depth", "offset_x", "offset_y", "image_x", "image_y", "alpha", "rho2", "reach"),
-        *("row_disc", "row_mid", "row_half", "x_left", "x_right"),
+        *("distance", "row_gap", "row_disc", "row_mid", "row_half", "x_left", "x_right"),
     }
 )
 

@@ -62,8 +62,8 @@ def require_single(scene: Scene) -> None:
     """Raises OutsidePlanError where float32 cannot hold the squares that shading in it needs."""
     if (ratio := spread(scene)) > LARGEST_RATIO_SINGLE:
         raise OutsidePlanError(
-            f"spheres[0].radius: {scene.spheres[0].radius} is {ratio:.3g} times smaller than the distance to the eye or "
-            f"the offset of the centre; float32 shading reaches {LARGEST_RATIO_SINGLE:.3g} times: use 'double'"
+            f"spheres[0].radius: {scene.spheres[0].radius} is {ratio:.3g} times smaller than the eye's distance or "
+            f"the offset of the centre; float32 reaches {LARGEST_RATIO_SINGLE:.3g}: use 'double'"
         )
 
 
