@@ -1,11 +1,12 @@
 """What a kernel rests on, as data: plan, derivation, chosen forms, proved invariants, silhouette, operations.
 
-Comes in: a Scene and an accuracy. Goes out: Explanation, frozen, of text and numbers: each formula as text and as LaTeX.
+Comes in: a Scene and an accuracy. Goes out: Explanation, frozen, of text and numbers: formulas as text and as LaTeX.
 Never done here: printing, compiling, or a formula that is not the derivation's own.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
@@ -23,6 +24,7 @@ from symrender_cg.run.numbers import numbers_of
 from symrender_cg.scene import Scene
 
 if TYPE_CHECKING:
+    from symrender_cg.derive.program import ImageProgram
     from symrender_cg.pipeline import Translation
 
 CENTRED = "x^2 + y^2 = e^2 R^2 / (e^2 - R^2)"
@@ -117,12 +119,14 @@ def explain(scene: Scene, accuracy: str = "double") -> Explanation:
         promise=variant.promise,
         decisions=plan.decisions,
         inputs=tuple(
-            (row.name, row.latex, row.meaning, numbers[row.name]) for row in INPUTS if row.name in translation.emitted.inputs
+            (row.name, row.latex, row.meaning, numbers[row.name])
+            for row in INPUTS
+            if row.name in translation.emitted.inputs
         ),
         textbook=textbook,
         guard=image.guard,
         forms=tuple(ChosenForm(entry.name, entry.removes, entry.source) for entry in fitting),
-        chosen=tuple(
+        chosen=_by_section(
             _quantity(s.name, s.value, s.meaning, s.source, s.section, names)
             for s in first.steps
             if (s.name, s.value) not in own
@@ -135,6 +139,29 @@ def explain(scene: Scene, accuracy: str = "double") -> Explanation:
     )
 
 
+def swollen_operations(image: ImageProgram) -> dict[str, int]:
+    """Operations of each named quantity, and of the `image`, written as one formula in the inputs (sympy's count).
+
+    Every definition is substituted into those that use it, the first one first: so each Max is built once.
+    """
+    closed: dict[sp.Symbol, sp.Expr] = {}
+    counts: dict[str, int] = {}
+    for definition in image.definitions:
+        closed[definition.symbol] = definition.value.xreplace(closed)
+        counts[definition.name] = int(sp.count_ops(closed[definition.symbol]))
+    # the Piecewise around shading and condition adds the comparisons alone
+    counts["image"] = counts[image.value] + int(sp.count_ops(image.condition()))
+    return counts
+
+
+def _by_section(quantities: Iterable[Quantity]) -> tuple[Quantity, ...]:
+    """The quantities of one section together, sections in the order in which they begin."""
+    groups: dict[str, list[Quantity]] = {}
+    for quantity in quantities:
+        groups.setdefault(quantity.section, []).append(quantity)
+    return tuple(quantity for group in groups.values() for quantity in group)
+
+
 def _quantity(
     name: str, value: sp.Basic, meaning: str, source: str, section: str, names: dict[sp.Symbol, str]
 ) -> Quantity:
@@ -144,8 +171,9 @@ def _quantity(
 
 def _latex_symbols(translation: Translation) -> dict[sp.Symbol, str]:
     """How every symbol of the derivation and of the chosen forms is set; a word is set upright, not as a product."""
-    steps = (*translation.image.definitions, *translation.passes[0].program.steps)
-    found = {symbol(step.name) for step in steps} | {s for step in steps for s in step.value.free_symbols}
+    named: list[tuple[str, sp.Basic]] = [(d.name, d.value) for d in translation.image.definitions]
+    named += [(step.name, step.value) for step in translation.passes[0].program.steps]
+    found = {symbol(name) for name, _ in named} | {s for _, value in named for s in value.free_symbols}
     return {s: _latex_of(s.name) for s in sorted(found, key=str)} | latex_names()
 
 
@@ -195,7 +223,7 @@ def _rounded(value: Fraction) -> float:
 def _stages(translation: Translation) -> tuple[Step, ...]:
     seconds = translation.seconds
     named, kernel = translation.image.operations(), sum(translation.program.operations().values())
-    closed = int(sp.count_ops(translation.image.as_piecewise()))
+    closed = swollen_operations(translation.image)["image"]
     return (
         Step("plan", seconds["plan"], None, None),
         Step("derive", seconds["derive"], closed, named),

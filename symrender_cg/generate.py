@@ -42,9 +42,7 @@ class Outcome:
     status: Status
 
 
-def generate(
-    translation: Translation, *, command: str, numbers: Mapping[str, float] | None = None
-) -> dict[str, str]:
+def generate(translation: Translation, *, command: str, numbers: Mapping[str, float] | None = None) -> dict[str, str]:
     """The texts of a kernel by their place below the folder of generated code.
 
     `command` is the one that the translation was made with; `numbers` are those baked in, if any.
@@ -61,7 +59,7 @@ def places(kernel: str, texts: Mapping[str, str], manifest: str) -> dict[str, st
 
 
 def manifest_text(translation: Translation, *, command: str, numbers: Mapping[str, float] | None = None) -> str:
-    """manifest.json of a kernel: what it is, what its plan rests on, how to call it, what it costs, how to remake it."""
+    """manifest.json of a kernel: what it is, what its plan rests on, its inputs, its cost, how to remake it."""
     emitted, variant = translation.emitted, translation.variant
     own = [name for name in emitted.files if Path(name).stem == emitted.name]
     manifest = {

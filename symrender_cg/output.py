@@ -147,7 +147,9 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
     except OSError as problem:
         if isinstance(problem, BrokenPipeError):
             raise
-        raise ArgumentError(f"{target}: cannot be written: {problem.strerror or problem}; choose another place") from None
+        raise ArgumentError(
+            f"{target}: cannot be written: {problem.strerror or problem}; choose another place"
+        ) from None
     finally:
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)

@@ -22,6 +22,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache as once
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,7 +96,7 @@ def compile_kernel(
 ) -> Kernel:
     """The kernel for a scene: from memory, from the cache on disk, or derived, emitted and compiled now."""
     chosen = variant(accuracy)
-    scene_plan = plan(scene, force=force)
+    scene_plan = _planned(scene, tuple(force))
     if chosen.shading == "float32":
         require_single(scene.in_camera_frame())
     root = Path(cache) if cache is not None else default_root()
@@ -150,7 +151,7 @@ def translate(
         plan=scene_plan,
         variant=chosen,
         sign_tests=tests,
-        command=command or f"python -m symrender_cg build --accuracy {chosen.name}",
+        command=command or f"python -m symrender_cg build SCENE --accuracy {chosen.name}",
         numbers=numbers,
         name=name or (f"{program.name}_baked" if bake else None),
     )
@@ -214,6 +215,12 @@ def _payload(translation: Translation) -> dict[str, Any]:
         "baked": not emitted.inputs,
         "operations": emitted.operations,
     }
+
+
+@lru_cache(maxsize=256)
+def _planned(scene: Scene, force: tuple[str, ...]) -> Plan:
+    """The plan of a scene, remembered: a scene is drawn more than once."""
+    return plan(scene, force=force)
 
 
 def _lock_of(key: tuple[Any, ...]) -> threading.Lock:

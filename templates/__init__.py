@@ -1,1 +1,1 @@
-"""Templates of the generated C and of its CMake package: files to be read, no code. Installed as symrender_cg.templates."""
+"""Templates of the generated C and of its CMake package: files to be read, no code. Installed inside the package."""

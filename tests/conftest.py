@@ -1,7 +1,8 @@
 """What every test runs under: a private cache for compiled kernels, hypothesis without deadlines, and `--update`.
 
 The cache is a temporary folder that all workers of one run share and that is removed after it: no test reads or writes
-the user's own. SYMRENDER_THOROUGH=1 asks hypothesis for twenty times as many examples where a test does not say how many.
+the user's own. SYMRENDER_THOROUGH=1 asks hypothesis for twenty times as many examples, where a test does not say how
+many.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 /* centred_sphere_double: one Phong sphere, one point light, accuracy "double" (symrender_cg 0.1.0)
- * Generated from the formula; do not edit. Regenerate with: python -m symrender_cg build chapter1 --accuracy double
+ * Generated from the formula; do not edit. Regenerate with:
+ *     python -m symrender_cg build chapter1 --accuracy double
  *
  * promise  about 1e-15 absolute on ordinary scenes; no overflow; hit or miss never wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone
- *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of the centre 4 > radius 1
+ *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of its centre 4 > R 1
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
@@ -113,7 +114,9 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     /* ray and sphere [1 mul] */
     const double s_row = y * y;   /* what is the same for a row in s */
 
-    const row r = {.y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row};
+    const row r = {
+        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row,
+    };
     return r;
 }
 
@@ -147,8 +150,9 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double facing2 = f->alpha.hi * chord;
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
 
@@ -163,8 +167,9 @@ SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double *si
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double facing2 = f->alpha.hi * chord;
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
@@ -260,8 +265,8 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
     }
 }
 
-void centred_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count, double white_limit,
-    const centred_sphere_double_scene *scene)
+void centred_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count,
+    double white_limit, const centred_sphere_double_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;

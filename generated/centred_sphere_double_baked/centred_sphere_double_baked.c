@@ -1,15 +1,17 @@
 /* centred_sphere_double_baked: one Phong sphere, one point light, accuracy "double" (symrender_cg 0.1.0)
- * Generated from the formula; do not edit. Regenerate with: python -m symrender_cg build chapter1 --accuracy double --bake
+ * Generated from the formula; do not edit. Regenerate with:
+ *     python -m symrender_cg build chapter1 --accuracy double --bake
  *
  * promise  about 1e-15 absolute on ordinary scenes; no overflow; hit or miss never wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone
- *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of the centre 4 > radius 1
+ *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of its centre 4 > R 1
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
- * baked    eye 4, radius 1, light_intensity 1, k_ambient 0.1, k_diffuse 0.7, k_specular 0.5, shininess 32, background 0, center_x 0, light_x 5, center_y 0, light_y 5, center_z 0, light_z 10
+ * baked    eye 4, radius 1, light_intensity 1, k_ambient 0.1, k_diffuse 0.7, k_specular 0.5, shininess 32,
+ *          background 0, center_x 0, light_x 5, center_y 0, light_y 5, center_z 0, light_z 10
  * ops      at build time: frame 3 call
  *          a row: 1 mul 5 call
  *          a pixel: 37 mul 28 add 2 div 2 sqrt 2 max 3 select 4 call
@@ -29,7 +31,8 @@ enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful one
 static const double background = 0.0;   /* where no ray hits */
 static const double plane_unit = 0.25;
 static const double_double alpha = {15.0, 0.0};   /* alpha = kappa^2 - 1, free of cancellation */
-static const double_double rho2 = {0.06666666666666667, 9.251858538542971e-19};   /* the silhouette is the circle x^2 + y^2 = rho^2 = f^2 / alpha */
+/* the silhouette is the circle x^2 + y^2 = rho^2 = f^2 / alpha */
+static const double_double rho2 = {0.06666666666666667, 9.251858538542971e-19};
 static const double_double depth = {4.0, 0.0};   /* kappa = e / R: lengths of the scene in radii */
 static const double along_frame = 4.0;   /* what is the same for a frame in along */
 static const double lamp_x = 5.0;   /* (L - C) / R */
@@ -55,7 +58,9 @@ SYMRENDER_INLINE row row_of(double y)
     /* ray and sphere [1 mul] */
     const double s_row = y * y;   /* what is the same for a row in s */
 
-    const row r = {.y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row};
+    const row r = {
+        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row,
+    };
     return r;
 }
 
@@ -88,8 +93,9 @@ static int is_hit(double column, double plane_y, const row *r, double pixel, dou
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = alpha.hi * from_left * to_right;
+    const double facing2 = alpha.hi * chord;
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + 1.0;
 
@@ -104,8 +110,9 @@ SYMRENDER_INLINE double shade(double x, const row *r, double *sight, double *sur
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = alpha.hi * from_left * to_right;
+    const double facing2 = alpha.hi * chord;
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + 1.0;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
@@ -204,7 +211,8 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
     }
 }
 
-void centred_sphere_double_baked_points(double *values, const double *x, const double *y, ptrdiff_t count, double white_limit)
+void centred_sphere_double_baked_points(double *values, const double *x, const double *y, ptrdiff_t count,
+    double white_limit)
 {
     const double unit = plane_unit;
     const double white = white_limit;

@@ -1,11 +1,12 @@
 /* centred_sphere_literal: one Phong sphere, one point light, accuracy "literal" (symrender_cg 0.1.0)
- * Generated from the formula; do not edit. Regenerate with: python -m symrender_cg build chapter1 --accuracy literal
+ * Generated from the formula; do not edit. Regenerate with:
+ *     python -m symrender_cg build chapter1 --accuracy literal
  *
  * promise  none: the seed's formula as it stands, in float64
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone
- *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of the centre 4 > radius 1
+ *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of its centre 4 > R 1
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
@@ -68,7 +69,9 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const double disc_row = y * y;   /* what is the same for a row in disc */
     (void)f;
 
-    const row r = {.y = y, .disc_row = disc_row};
+    const row r = {
+        .y = y, .disc_row = disc_row,
+    };
     return r;
 }
 
@@ -147,8 +150,8 @@ void centred_sphere_literal_rows(double *image, ptrdiff_t stride, const symrende
     }
 }
 
-void centred_sphere_literal_points(double *values, const double *x, const double *y, ptrdiff_t count, double white_limit,
-    const centred_sphere_literal_scene *scene)
+void centred_sphere_literal_points(double *values, const double *x, const double *y, ptrdiff_t count,
+    double white_limit, const centred_sphere_literal_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = 1.0;

@@ -1,11 +1,12 @@
 /* centred_sphere_single: one Phong sphere, one point light, accuracy "single" (symrender_cg 0.1.0)
- * Generated from the formula; do not edit. Regenerate with: python -m symrender_cg build chapter1 --accuracy single
+ * Generated from the formula; do not edit. Regenerate with:
+ *     python -m symrender_cg build chapter1 --accuracy single
  *
  * promise  a few units of 1e-6 on the unclipped field; hit or miss never wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone
- *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of the centre 4 > radius 1
+ *          sphere at the plane of the eye: the sphere lies wholly before the eye: depth of its centre 4 > R 1
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
@@ -29,7 +30,7 @@ enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful one
 typedef struct {
     double plane_unit;
     float lamp_x_single, lamp_y_single, lamp_z_single, focal_single, d_dot_d_frame, depth_single, along_frame,
-        diffuse_gain, shininess_single, zero_power, specular_gain, k_ambient_single;
+        diffuse_gain, shininess_single, specular_gain, zero_power_single, k_ambient_single;
     double_double alpha, rho2;
 } frame;
 
@@ -82,9 +83,10 @@ static frame frame_of(const centred_sphere_single_scene *scene)
 
     /* specular [1 mul 1 select] */
     const float shininess_single = (float)scene->shininess;
-    const float zero_power = shininess_single == 0.0f ? 1.0f : 0.0f;   /* 0^n: 1 for n = 0 */
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
     const float k_specular_single = (float)scene->k_specular;
     const float specular_gain = k_specular_single * light_intensity_single;   /* I_L k_s */
+    const float zero_power_single = (float)zero_power;
 
     /* intensity */
     const float k_ambient_single = (float)scene->k_ambient;
@@ -102,8 +104,8 @@ static frame frame_of(const centred_sphere_single_scene *scene)
         .along_frame = along_frame,
         .diffuse_gain = diffuse_gain,
         .shininess_single = shininess_single,
-        .zero_power = zero_power,
         .specular_gain = specular_gain,
+        .zero_power_single = zero_power_single,
         .k_ambient_single = k_ambient_single,
     };
     return f;
@@ -127,7 +129,9 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const float y_single = (float)y;
     const float s_row = y_single * y_single;   /* what is the same for a row in s */
 
-    const row r = {.x_left = x_left, .x_right = x_right, .y_single = y_single, .s_row = s_row};
+    const row r = {
+        .x_left = x_left, .x_right = x_right, .y_single = y_single, .s_row = s_row,
+    };
     return r;
 }
 
@@ -161,8 +165,9 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double facing2 = f->alpha.hi * chord;
     const float x_single = (float)x;
     const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const float d_dot_d = s + f->d_dot_d_frame;
@@ -178,8 +183,9 @@ SYMRENDER_INLINE float shade(double x, const row *r, const frame *f, double *sig
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double facing2 = f->alpha.hi * chord;
     const float x_single = (float)x;
     const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const float d_dot_d = s + f->d_dot_d_frame;
@@ -222,7 +228,7 @@ SYMRENDER_INLINE float shade(double x, const row *r, const frame *f, double *sig
     const float sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
     const float highlight = power_of_cosinef(cos2, sin2, f->shininess_single);   /* max(0, r.v)^n where r.v > 0 */
     /* k_s max(0, r.v)^n */
-    const float specular = (w_dot_mirror > 0.0f ? highlight : f->zero_power) * f->specular_gain;
+    const float specular = (w_dot_mirror > 0.0f ? highlight : f->zero_power_single) * f->specular_gain;
 
     /* intensity [2 add 1 select]. Phong 1975, Illumination for computer generated pictures */
     const float lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
@@ -279,8 +285,8 @@ void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_
     }
 }
 
-void centred_sphere_single_points(float *values, const double *x, const double *y, ptrdiff_t count, double white_limit,
-    const centred_sphere_single_scene *scene)
+void centred_sphere_single_points(float *values, const double *x, const double *y, ptrdiff_t count,
+    double white_limit, const centred_sphere_single_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;

@@ -1,17 +1,18 @@
 /* off_axis_sphere_double: one Phong sphere, one point light, accuracy "double" (symrender_cg 0.1.0)
- * Generated from the formula; do not edit. Regenerate with: python -m symrender_cg build off_axis --accuracy double
+ * Generated from the formula; do not edit. Regenerate with:
+ *     python -m symrender_cg build off_axis --accuracy double
  *
  * promise  about 1e-15 absolute on ordinary scenes; no overflow; hit or miss never wrong
  * in       sphere off the axis
  *          diffuse term
  *          specular term
- * out      sphere at the plane of the eye: the sphere lies wholly before the eye: depth of the centre 4.49121 >
- *          radius 0.875
+ * out      sphere at the plane of the eye: the sphere lies wholly before the eye: depth of its centre 4.49121 > R
+ *          0.875
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
- * ops      once: frame 3 mul 3 add 4 div 1 select 43 call
- *          a row: 4 mul 2 add 18 call
+ * ops      once: frame 3 mul 3 add 4 div 1 select 40 call
+ *          a row: 4 mul 2 add 16 call
  *          a pixel: 47 mul 34 add 2 div 2 sqrt 2 max 2 select 1 call
  */
 #include "off_axis_sphere_double.h"
@@ -30,7 +31,7 @@ enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful one
 typedef struct {
     double plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, tilt_frame, diffuse_gain, zero_power,
         specular_gain, k_ambient, shininess;
-    double_double offset_y, alpha, depth, offset_x, row_mid_frame, row_disc_frame, row_disc_frame_1, row_half_frame,
+    double_double offset_y, alpha, depth, offset_x, row_mid_frame, row_gap_frame, row_disc_frame, row_half_frame,
         x_left_frame, image_x, image_y;
 } frame;
 
@@ -57,27 +58,26 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
     const double lamp_y = ldexp(from_center_y, lamp_exponent) / radius;
     const double lamp_z = ldexp(from_center_z, lamp_exponent) / radius;
 
-    /* silhouette [31 call] */
+    /* silhouette [28 call] */
+    const double_double distance = dd_difference(eye, center_z);   /* of the eye from the plane of the centre */
     const double_double offset_y = dd_div(dd_from(center_y), dd_from(radius));
-    const double_double share_2 = dd_difference(center_z, eye);
     /* disc / R^2 is -alpha x^2 + ... along a row; alpha = kappa^2 - 1 + offset_y^2 > 0 */
-    const double_double alpha = dd_add(dd_mul(offset_y, offset_y),
-        dd_div(dd_mul(dd_add_double(dd_sum(eye, radius), -center_z), dd_sub(dd_from(-radius), share_2)),
-        dd_product(radius, radius)));
+    const double_double alpha = dd_add(dd_div(dd_mul(dd_add_double(distance, -radius),
+        dd_add_double(distance, radius)), dd_product(radius, radius)), dd_mul(offset_y, offset_y));
     /* rays D = (x, y, -f): f is e, in the unit of the image plane */
     const double focal = ldexp(scene->eye, plane_exponent);
-    const double_double depth = dd_neg(dd_div(share_2, dd_from(radius)));   /* the centre seen from the eye, in radii */
+    const double_double depth = dd_div(distance, dd_from(radius));   /* kappa: the same in radii */
     const double_double offset_x = dd_div(dd_from(center_x), dd_from(radius));
     const double_double row_mid_frame = dd_mul_double(depth, focal);   /* what is the same for a frame in row_mid */
+    const double_double share_2 = dd_mul_double(offset_y, focal);
+    const double_double row_gap_frame = dd_neg(share_2);   /* what is the same for a frame in row_gap */
     const double_double row_disc_frame = dd_product(focal, focal);   /* what is the same for a frame in row_disc */
-    const double_double share_3 = dd_mul_double(offset_y, focal);
-    const double_double row_disc_frame_1 = dd_neg(share_3);   /* what is the same for a frame in row_disc */
     /* what is the same for a frame in row_half */
     const double_double row_half_frame = dd_add(alpha, dd_mul(offset_x, offset_x));
     const double_double x_left_frame = dd_div(dd_from(1.0), alpha);   /* what is the same for a frame in x_left */
     /* where the centre appears on the image plane */
     const double_double image_x = dd_div(dd_mul_double(offset_x, focal), depth);
-    const double_double image_y = dd_div(share_3, depth);
+    const double_double image_y = dd_div(share_2, depth);
 
     /* ray and sphere [1 mul] */
     const double d_dot_d_frame = focal * focal;   /* what is the same for a frame in d_dot_d */
@@ -103,8 +103,8 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
         .depth = depth,
         .offset_x = offset_x,
         .row_mid_frame = row_mid_frame,
+        .row_gap_frame = row_gap_frame,
         .row_disc_frame = row_disc_frame,
-        .row_disc_frame_1 = row_disc_frame_1,
         .row_half_frame = row_half_frame,
         .x_left_frame = x_left_frame,
         .image_x = image_x,
@@ -128,13 +128,13 @@ typedef struct {
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
 {
-    /* silhouette [18 call] */
+    /* silhouette [16 call] */
     /* alpha times the span's middle */
     const double_double row_mid = dd_mul(f->offset_x, dd_add(dd_mul_double(f->offset_y, y), f->row_mid_frame));
+    /* by how much the row misses the centre */
+    const double_double row_gap = dd_add(dd_mul_double(f->depth, y), f->row_gap_frame);
     /* positive where the plane through eye and row cuts the sphere */
-    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->row_disc_frame),
-        dd_mul(dd_add(dd_mul_double(f->depth, y), f->row_disc_frame_1),
-        dd_add(dd_mul_double(f->depth, y), f->row_disc_frame_1)));
+    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->row_disc_frame), dd_mul(row_gap, row_gap));
     /* alpha times half the span's length */
     const double_double row_half = dd_sqrt(dd_positive_part(dd_mul(row_disc, f->row_half_frame)));
     /* the row's hits are x_left <= x <= x_right */
@@ -150,7 +150,10 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const double n_y_row = f->focal * dy;   /* what is the same for a row in n_y */
     const double n_z_row = y * dy;   /* what is the same for a row in n_z */
 
-    const row r = {.y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row, .tilt_row = tilt_row, .n_y_row = n_y_row, .n_z_row = n_z_row};
+    const row r = {
+        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row, .tilt_row = tilt_row, .n_y_row = n_y_row,
+        .n_z_row = n_z_row,
+    };
     return r;
 }
 
@@ -197,8 +200,9 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double facing2 = f->alpha.hi * chord;
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
 
@@ -213,8 +217,9 @@ SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double *si
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * from_left * to_right;
+    const double facing2 = f->alpha.hi * chord;
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
@@ -312,8 +317,8 @@ void off_axis_sphere_double_rows(double *image, ptrdiff_t stride, const symrende
     }
 }
 
-void off_axis_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count, double white_limit,
-    const off_axis_sphere_double_scene *scene)
+void off_axis_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count,
+    double white_limit, const off_axis_sphere_double_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;

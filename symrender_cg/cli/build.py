@@ -21,7 +21,7 @@ from symrender_cg import generate, pipeline
 from symrender_cg.build.cache import Cache
 from symrender_cg.build.library import CachedKernel
 from symrender_cg.cli.console import Column, Table, counted, duration, listed
-from symrender_cg.lower.variants import ACCURACIES
+from symrender_cg.cli.levels import accuracies_for
 from symrender_cg.plan.plan import Plan, plan
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.scene import Scene, load_scene
@@ -75,9 +75,9 @@ class Built:
 def run(arguments: argparse.Namespace) -> int:
     """Builds every accuracy that is asked for and prints what was done."""
     begin = time.perf_counter()
-    accuracies = ACCURACIES if arguments.accuracy == "all" else arguments.accuracy
     scene = load_scene(arguments.scene)
     scene_plan = plan(scene)
+    accuracies = accuracies_for(scene, arguments.accuracy)
     folder = Path(arguments.out)
     orders = [
         Order(
@@ -93,17 +93,16 @@ def run(arguments: argparse.Namespace) -> int:
     store = Cache()
     recalled = [None if arguments.passes else _recall(store, order) for order in orders]
     missing = [order for order, built in zip(orders, recalled, strict=True) if built is None]
-    fresh = _build(store, missing) if missing else []
+    fresh, closed = _build(store, missing) if missing else ([], {})
     kernels = [*filter(None, recalled), *fresh]
     files = {place: text for built in kernels for place, text in built.files.items()}
     written = generate.write(files, folder)
     if not missing and all(outcome.status == "unchanged" for outcome in written):
         names = listed([built.name for built in kernels])
-        print(f"nothing to do: {names} {'is' if len(kernels) == 1 else 'are'} up to date ({counted(len(files), 'file')}")
-        print(f"in {folder}/, {counted(len(kernels), 'library' if len(kernels) == 1 else 'librarie')} in the cache)")
+        print(f"nothing had to be done: {names} up to date, {counted(len(files), 'file')} unchanged in {folder}/")
     else:
         if fresh:
-            _table(fresh, passes=arguments.passes).show()
+            _table(fresh, closed, passes=arguments.passes).show()
             print()
         _print_files(written, folder)
     for built in kernels:
@@ -131,15 +130,17 @@ def _recall(store: Cache, order: Order) -> Built | None:
     return Built(order, payload["name"], cached, generate.places(payload["name"], texts, payload["manifest"]))
 
 
-def _build(store: Cache, orders: Sequence[Order]) -> list[Built]:
-    """Derives every order here, and compiles them side by side."""
+def _build(store: Cache, orders: Sequence[Order]) -> tuple[list[Built], dict[str, int]]:
+    """Derives every order here and compiles them side by side; and the swell meter's counts, the same for all."""
+    from symrender_cg.explain import swollen_operations
+
     with ThreadPoolExecutor(COMPILING_THREADS, thread_name_prefix="symrender_cg-build") as pool:
         jobs: list[tuple[Order, Translation, Future[tuple[CachedKernel, float]]]] = []
         for order in orders:
             translation = pipeline.translate(order.scene, order.accuracy, bake=order.bake, command=order.command)
             jobs.append((order, translation, pool.submit(_compile, store, order, translation)))
-        swell(jobs[0][1])  # counted while the compiler runs
-        return [_kept(store, order, translation, *job.result()) for order, translation, job in jobs]
+        counts = swollen_operations(jobs[0][1].image)  # counted while the compiler runs
+        return [_kept(store, order, translation, *job.result()) for order, translation, job in jobs], counts
 
 
 def _compile(store: Cache, order: Order, translation: Translation) -> tuple[CachedKernel, float]:
@@ -174,11 +175,10 @@ _SWELL = (
 )
 
 
-def _table(kernels: Sequence[Built], *, passes: bool) -> Table:
+def _table(kernels: Sequence[Built], closed: dict[str, int], *, passes: bool) -> Table:
     table = Table(_COLUMNS)
     first = kernels[0].translation
     assert first is not None, "a fresh kernel has its translation"
-    closed = swell(first)
     for built in kernels:
         translation = built.translation
         assert translation is not None, "a fresh kernel has its translation"
@@ -220,24 +220,6 @@ def _stage_rows(table: Table, built: Built, translation: Translation, image: int
         table.add("  bake", "", "", "", _saved(built))
     made = "the library was in the cache" if built.cached.from_cache else "compiled"
     table.add("  build", duration(built.seconds), "", "", made)
-
-
-def swell(translation: Translation) -> dict[str, int]:
-    """Operations of t, n.l, r.v, the shading and the image, each written as one formula in the inputs (sympy's count)."""
-    key = translation.plan.key
-    if key not in _swollen:
-        import sympy as sp
-
-        image = translation.image
-        closed = {name: image.closed(name) for _, name in _SWELL if name in image}
-        counts = {name: int(sp.count_ops(value)) for name, value in closed.items()}
-        # the Piecewise around shading and condition adds the comparisons alone
-        counts["image"] = counts["value"] + int(sp.count_ops(image.condition()))
-        _swollen[key] = counts
-    return _swollen[key]
-
-
-_swollen: dict[tuple[str, ...], dict[str, int]] = {}
 
 
 def _named_operations(translation: Translation, name: str) -> int:

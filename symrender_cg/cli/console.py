@@ -9,6 +9,9 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+FOLDED_WIDTH = 30
+"""The last column of a table is not made narrower than this on a terminal."""
+
 
 @dataclass(frozen=True, slots=True)
 class Column:
@@ -51,8 +54,15 @@ class Table:
         return "\n".join(lines)
 
     def show(self) -> None:
-        """Prints the table to stdout."""
+        """Prints the table to stdout. On a terminal only the last column is folded; one too narrow gets plain text."""
         if not sys.stdout.isatty():
+            print(self.plain())
+            return
+        import shutil
+
+        filled = [tuple(column.head for column in self.columns), *(row for row in self.rows if row is not None)]
+        widths = [max(len(row[i]) for row in filled) for i in range(len(self.columns))]
+        if sum(widths[:-1]) + 2 * len(widths) + min(widths[-1], FOLDED_WIDTH) > shutil.get_terminal_size().columns:
             print(self.plain())
             return
         from rich import box
@@ -62,7 +72,10 @@ class Table:
 
         table = RichTable(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
         for column in self.columns:
-            table.add_column(column.head, justify="right" if column.right else "left", overflow="fold")
+            last = column is self.columns[-1]
+            table.add_column(
+                column.head, justify="right" if column.right else "left", no_wrap=not last, overflow="fold"
+            )
         for row in self.rows:
             if row is None:
                 table.add_section()

@@ -105,7 +105,9 @@ def _print(found: Explanation) -> None:
 
     _head("the textbook's derivation")
     _print_quantities(found.textbook)
-    print(f"the ray hits where {' and '.join(condition(name) for name in found.guard)}; elsewhere the background is seen")
+    print(
+        f"the ray hits where {' and '.join(condition(name) for name in found.guard)}; elsewhere the background is seen"
+    )
 
     _head(f'the forms that "{found.accuracy}" uses in place of the textbook\'s')
     table = Table((Column("form"), Column("removes"), Column("source")))
@@ -129,7 +131,9 @@ def _print(found: Explanation) -> None:
         print(f"  {CENTRED} = rho^2, rho = {silhouette.rho!r}")
 
     _head("operations")
-    table = Table((Column("stage"), Column("time", right=True), Column("before", right=True), Column("after", right=True)))
+    table = Table(
+        (Column("stage"), Column("time", right=True), Column("before", right=True), Column("after", right=True))
+    )
     for step in found.stages:
         table.add(step.name, duration(step.seconds), *("" if n is None else str(n) for n in (step.before, step.after)))
         if step.name == "lower":
@@ -171,7 +175,7 @@ def _print_quantities(quantities: tuple[Quantity, ...]) -> None:
 
 
 def _conic(coefficients: tuple[float, ...]) -> str:
-    parts = []
+    parts: list[str] = []
     for value, power in zip(coefficients, ("x^2", "x y", "y^2", "x", "y", ""), strict=True):
         if value != 0.0:
             sign = ("- " if value < 0 else "+ ") if parts else ("-" if value < 0 else "")

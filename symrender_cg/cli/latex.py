@@ -76,7 +76,8 @@ def _body(found: Explanation) -> Iterator[str]:
     yield rf"\[ {a} x^2 + {b} x y + {c} y^2 + {d} x + {e} y + {f} = 0 \]"
     yield rf"which is a conic: {escaped(found.silhouette.kind)}."
     if found.silhouette.rho is not None:
-        yield rf"\[ x^2 + y^2 = \frac{{e^2 R^2}}{{e^2 - R^2}} = \rho^2, \qquad \rho = {_number(found.silhouette.rho)} \]"
+        rho = _number(found.silhouette.rho)
+        yield rf"\[ x^2 + y^2 = \frac{{e^2 R^2}}{{e^2 - R^2}} = \rho^2, \qquad \rho = {rho} \]"
 
 
 def _quantities(quantities: tuple[Quantity, ...]) -> Iterator[str]:

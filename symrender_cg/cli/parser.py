@@ -74,8 +74,8 @@ examples:
 
 _CHECK = """\
 Compares each compiled kernel with the oracle (exact arithmetic and Arb balls, correctly rounded), with vectorised numpy
-and with the per-pixel loop: on the pixel centres of a whole image, and on points near the silhouette, the terminator and
-the highlight. Errors are those of the unclipped field. Exit code 4 when a stated bound is broken."""
+and with the per-pixel loop: on the pixel centres of a whole image, and on points near the silhouette, the terminator
+and the highlight. Errors are those of the unclipped field. Exit code 4 when a stated bound is broken."""
 _CHECK_EXAMPLES = """\
 examples:
   python -m symrender_cg check
@@ -133,9 +133,7 @@ def _command(commands: argparse._SubParsersAction[Parser], name: str, short: str
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument(
-        "--debug", action="store_true", default=argparse.SUPPRESS, help="traceback and log of an error"
-    )
+    parser.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help="traceback and log of an error")
     return parser
 
 
@@ -207,7 +205,11 @@ def _size(parser: Parser, default: tuple[int, int]) -> None:
 
 def _accuracy(parser: Parser) -> None:
     parser.add_argument(
-        "--accuracy", choices=ACCURACIES, default="double", metavar="A", help=f"{', '.join(ACCURACIES)} (default: double)"
+        "--accuracy",
+        choices=ACCURACIES,
+        default="double",
+        metavar="A",
+        help=f"{', '.join(ACCURACIES)} (default: double)",
     )
 
 
@@ -237,14 +239,14 @@ def image_size(text: str) -> tuple[int, int]:
     )
 
 
-def accuracy_list(text: str) -> tuple[str, ...]:
-    """`double,literal` -> those accuracies in the order of the package, each once; `all` -> all of them."""
+def accuracy_list(text: str) -> tuple[str, ...] | str:
+    """`double,literal` -> those accuracies in the order of the package, each once; `all` -> `all`."""
     names = [name.strip() for name in text.split(",")]
     if unknown := [name for name in names if name not in (*ACCURACIES, "all")]:
         raise argparse.ArgumentTypeError(
             f"{unknown[0]!r} is not known; expected some of {', '.join(ACCURACIES)}, or all"
         )
-    return ACCURACIES if "all" in names else tuple(name for name in ACCURACIES if name in names)
+    return "all" if "all" in names else tuple(name for name in ACCURACIES if name in names)
 
 
 def _count(text: str) -> int:

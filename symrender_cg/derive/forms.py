@@ -78,9 +78,19 @@ def _seed_disc(_: ImageProgram) -> tuple[Definition, ...]:
 
 
 def _quadratic_disc(_: ImageProgram) -> tuple[Definition, ...]:
+    x, y, eye = symbols("x y eye")
     m2 = sum(S(f"m_{axis}") ** 2 for axis in "xyz")
     value = S("m_dot_d") ** 2 - S("d_dot_d") * (m2 - S("radius") ** 2)
-    return (Definition("disc", value, "ray and sphere", "disc = (m.D)^2 - |D|^2 (|m|^2 - R^2): a hit where >= 0"),)
+    return (
+        Definition("d_dot_d", x**2 + y**2 + eye**2, "ray and sphere", "D = (x, y, -e), A = |D|^2"),
+        Definition(
+            "m_dot_d",
+            S("m_x") * x + S("m_y") * y - S("m_z") * eye,
+            "ray and sphere",
+            "positive where the sphere lies before the eye",
+        ),
+        Definition("disc", value, "ray and sphere", "disc = (m.D)^2 - |D|^2 (|m|^2 - R^2): a hit where >= 0"),
+    )
 
 
 def _disc_claim() -> tuple[Claim, ...]:
@@ -163,9 +173,10 @@ def _facing() -> tuple[Definition, ...]:
     return (
         Definition("from_left", x - S("x_left"), _RAY, "distance to the two ends of the span, not negative inside it"),
         Definition("to_right", S("x_right") - x, _RAY),
+        Definition("chord", S("from_left") * S("to_right"), _RAY),
         Definition(
             "facing2",
-            S("alpha") * S("from_left") * S("to_right"),
+            S("alpha") * S("chord"),
             _RAY,
             "disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette",
         ),
@@ -509,10 +520,13 @@ def form(name: str) -> Form:
     raise KeyError(name)
 
 
-def apply(program: ImageProgram, chosen: tuple[Form, ...], *, keep_all: bool = False) -> ImageProgram:
+def apply(
+    program: ImageProgram, chosen: tuple[Form, ...], *, keep: tuple[str, ...] = (), keep_all: bool = False
+) -> ImageProgram:
     """The program with the definitions of the chosen forms in place of its own, in an order that defines before use.
 
-    Definitions that nothing uses are left out, unless `keep_all` asks for them (a proof may speak of them).
+    Definitions that nothing uses are left out, unless `keep` names them or `keep_all` asks for all (a proof may speak
+    of them).
     """
     table = {definition.name: definition for definition in program.definitions}
     rename: dict[str, str] = {}
@@ -534,7 +548,7 @@ def apply(program: ImageProgram, chosen: tuple[Form, ...], *, keep_all: bool = F
         place(name)
     if keep_all:
         return ImageProgram(program.name, tuple(ordered), guard, program.value, program.background)
-    return ImageProgram(program.name, (), guard, program.value, program.background).replacing(tuple(ordered))
+    return ImageProgram(program.name, (), guard, program.value, program.background).replacing(tuple(ordered), keep=keep)
 
 
 def _position(table: dict[str, Definition]) -> Callable[[str], int]:

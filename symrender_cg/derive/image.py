@@ -30,13 +30,14 @@ def derive(plan: Plan) -> ImageProgram:
 def centred(program: ImageProgram) -> ImageProgram:
     """The specialisation C = (0, 0, 0) of a program: the sphere of Chapter 1.
 
-    Definitions that become a number or another name are substituted into those that use them.
+    Definitions that become a number or another name are substituted into those that use them, except the image's value.
     """
     known: dict[sp.Symbol, sp.Expr] = {symbol(f"center_{axis}"): sp.Integer(0) for axis in "xyz"}
     kept: list[Definition] = []
     for definition in program.definitions:
         value = definition.value.xreplace(known).doit()
-        if value.is_number or value.is_Symbol or (-value).is_Symbol:
+        trivial = value.is_number or value.is_Symbol or (-value).is_Symbol
+        if trivial and definition.name != program.value:
             known[definition.symbol] = value
         else:
             kept.append(Definition(definition.name, value, definition.section, definition.meaning, definition.source))

@@ -72,11 +72,13 @@ class ImageProgram:
 
     def closed(self, name: str, *, keep: tuple[str, ...] = ()) -> sp.Expr:
         """The named quantity with every definition substituted, except those in `keep`."""
-        value = self[name].value if name in self else symbol(name)
-        for definition in reversed(self.definitions):
-            if definition.name not in keep and definition.name != name:
-                value = value.xreplace({definition.symbol: definition.value})
-        return value
+        closed: dict[sp.Symbol, sp.Expr] = {}
+        for definition in self.definitions:
+            if definition.name == name:
+                return definition.value.xreplace(closed)
+            if definition.name not in keep:
+                closed[definition.symbol] = definition.value.xreplace(closed)
+        return symbol(name)
 
     def condition(self) -> sp.Basic:
         """The guard as a sympy condition in the inputs: disc >= 0 and every other guarded name > 0."""
@@ -92,9 +94,9 @@ class ImageProgram:
         """The image as one expression: Piecewise((shading, hit), (background, True))."""
         return sp.Piecewise((self.closed(self.value), self.condition()), (symbol(self.background), True))
 
-    def replacing(self, definitions: tuple[Definition, ...]) -> ImageProgram:
-        """The same program with other definitions, those that nothing uses left out."""
-        needed = {self.value, *self.guard}
+    def replacing(self, definitions: tuple[Definition, ...], *, keep: tuple[str, ...] = ()) -> ImageProgram:
+        """The same program with other definitions, those that nothing uses and `keep` does not name left out."""
+        needed = {self.value, *self.guard, *keep}
         kept: list[Definition] = []
         for definition in reversed(definitions):
             if definition.name in needed:

@@ -81,7 +81,7 @@ def emit(
         "plan": plan,
         "variant": variant,
         "baked": numbers is not None,
-        "numbers": numbers or {},
+        "baked_numbers": ", ".join(f"{key} {value:.6g}" for key, value in (numbers or {}).items()),
         "includes": includes,
         "real": "float" if variant.shading == "float32" else "double",
         "single": variant.shading == "float32",
@@ -170,14 +170,15 @@ class _Writer:
         carried = "" if baked else "f->"
         frame_places = dict.fromkeys((*program.inputs, *(s.name for s in program.at("frame"))), carried)
         self.row = self._body(row, frame_places)
-        pixel_places = frame_places | {s.name: "r->" for s in row} | {"y": "r->"}
-        self.pixel = self._body(pixel, pixel_places)
-        self.sight = self._body(self._closure(("d_dot_d", *program.hit)), pixel_places)
+        self.pixel_places = frame_places | {s.name: "r->" for s in row} | {"y": "r->"}
+        self.pixel = self._body(pixel, self.pixel_places)
+        self.sight = self._body(self._closure(("d_dot_d", *program.hit)), self.pixel_places)
         self.constants = self._constants(program.at("frame")) if baked else []
 
     def word(self, name: str) -> str:
-        """The C expression of a quantity as one floating-point number: the high word of a double-double."""
-        return f"{name}.hi" if self.format[name] == "double_double" else name
+        """The C expression of a quantity in `shade`, as one floating-point number: the high word of a double-double."""
+        place = self.pixel_places.get(name, "")
+        return place + (f"{name}.hi" if self.format[name] == "double_double" else name)
 
     @property
     def row_uses_frame(self) -> bool:
@@ -276,8 +277,11 @@ class _Writer:
                 value = f"{{{words}}}"
             else:
                 value = printer._print(step.value)
-            meaning = f"   /* {step.meaning} */" if step.meaning else ""
-            lines.append(f"static const {kind} {step.name} = {value};{meaning}")
+            line = f"static const {kind} {step.name} = {value};"
+            if step.meaning and len(line) + len(step.meaning) + 9 > WIDTH:
+                lines += [f"/* {step.meaning} */", line]
+            else:
+                lines.append(f"{line}   /* {step.meaning} */" if step.meaning else line)
         return lines
 
 

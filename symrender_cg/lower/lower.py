@@ -95,7 +95,7 @@ def choose_forms(image: ImageProgram, plan: Plan, variant: Variant) -> KernelPro
     off_axis, front_test = plan.needs("off_axis"), plan.needs("front_test")
     entries = (forms.form(name) for name in variant.forms)
     chosen = tuple(entry for entry in entries if entry.fits(image, off_axis=off_axis, front_test=front_test))
-    program = forms.apply(image, chosen)
+    program = forms.apply(image, chosen, keep=("d_dot_d",) if variant.exact else ())  # how sure a hit is, is in |D|^2
     ends = next((entry.ends for entry in chosen if entry.ends), None)
     steps = tuple(Step(d.name, d.value, d.section, d.meaning, d.source) for d in program.definitions)
     order = [row.name for row in INPUTS]

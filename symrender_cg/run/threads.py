@@ -1,4 +1,4 @@
-"""Rows over threads: blocks of rows, taken in turn by a pool that lives as long as the process.
+"""Rows over threads: blocks of rows, taken in turn by the caller and by a pool that lives as long as the process.
 
 The kernel releases the GIL, rows do not depend on one another, so any number of threads gives the same bits.
 """
@@ -10,6 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
+from threading import Lock
 
 from symrender_cg.errors import ArgumentError
 
@@ -29,15 +30,33 @@ def thread_count(threads: int | None, pixels: int) -> int:
 
 
 def over_rows(render: Callable[[int, int], None], height: int, threads: int) -> None:
-    """Calls render(begin, end) for blocks of rows that cover [0, height), on that many threads."""
+    """Calls render(begin, end) for blocks of rows that cover [0, height), on that many threads, the caller's among them.
+
+    A thread of the pool that wakes late finds nothing left to do, and is not waited for.
+    """
     if threads == 1 or height == 1:
         render(0, height)
         return
     blocks = min(height, threads * _BLOCKS_A_THREAD)
     ends = [height * k // blocks for k in range(blocks + 1)]
-    futures = [_pool(threads).submit(render, a, b) for a, b in pairwise(ends)]
-    for future in futures:
-        future.result()
+    turns = iter(pairwise(ends))
+    lock = Lock()
+
+    def work() -> None:
+        while True:
+            with lock:
+                turn = next(turns, None)
+            if turn is None:
+                return
+            render(*turn)
+
+    futures = [_pool(threads - 1).submit(work) for _ in range(threads - 1)]
+    try:
+        work()
+    finally:
+        for future in futures:
+            if not future.cancel():
+                future.result()
 
 
 @cache

@@ -9,6 +9,7 @@ them. Never done here: a change of what is seen, or a repair of a scene that can
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 from symrender_cg.errors import SceneError
 from symrender_cg.scene import exact
@@ -28,6 +29,7 @@ def is_in_frame(camera: Camera) -> bool:
     return camera.look_at == ORIGIN and eye[:2] == (0.0, 0.0) and eye[2] > 0.0 and up[0] == 0.0 and up[1] > 0.0
 
 
+@lru_cache(maxsize=256)
 def in_camera_frame(scene: Scene) -> Scene:
     """The scene with Camera(eye=(0, 0, e), look_at=(0, 0, 0), up=(0, 1, 0), half_height=h); itself when it is that.
 

@@ -1,5 +1,5 @@
-/* Kernel functions are one expression cut into named pieces: a loop over them vectorises only once they are all inlined,
- * and a compiler's patience for that may end early. */
+/* Kernel functions are one expression cut into named pieces: a loop over them vectorises only once they are all
+ * inlined, and a compiler's patience for that may end early. */
 #ifndef SYMRENDER_INLINE_H
 #define SYMRENDER_INLINE_H
 

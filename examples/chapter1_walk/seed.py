@@ -73,7 +73,7 @@ def cell_2() -> SeedImage:
 
 
 def cell_3_function(seed: SeedImage, expression: Any) -> Callable[[FloatArray, FloatArray], FloatArray]:
-    """Cell 3's `lambdify(params, expression)` with the seed's scene filled in: (X, Y) -> values, nan where numpy says so."""
+    """Cell 3's `lambdify(params, expression)` with the seed's scene filled in: (X, Y) -> values."""
     heaviside = {"Heaviside": lambda u, _: (u >= 0).astype(float)}
     function = sp.lambdify(seed.parameters, expression, modules=["numpy", heaviside])
 

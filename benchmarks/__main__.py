@@ -1,0 +1,70 @@
+"""`python -m benchmarks`: arguments in, tables or JSON out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+
+from rich.console import Console
+
+import benchmarks
+from benchmarks import speed, start
+from symrender_cg.errors import SymrenderError
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one benchmark; 0, or the exit code of what went wrong."""
+    options = _parser().parse_args(argv)
+    console = Console() if sys.stdout.isatty() else Console(width=140)
+    try:
+        with Console(stderr=True).status("starting") as status:
+            told: Callable[[str], None] = status.update
+            report = _measured(options, told)
+    except SymrenderError as problem:
+        print(f"benchmarks: error: {problem}", file=sys.stderr)
+        return problem.exit_code
+    if options.json:
+        print(json.dumps(report.to_dict(), indent=1))
+    else:
+        report.show(console)
+    return 0
+
+
+def _measured(options: argparse.Namespace, told: Callable[[str], None]) -> speed.Report | start.Report:
+    if options.command == "start":
+        return start.measure_start(options.size, options.rounds, options.seed, told)
+    return speed.measure_speed(options.size, options.rounds, options.shininess, options.points, options.seed, told)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description=benchmarks.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    fast = commands.add_parser("speed", help="nanoseconds a pixel of every contestant, and its largest errors")
+    fast.add_argument("--size", type=_count, nargs="+", default=[256, 1024], help="sides of the images (256 1024)")
+    fast.add_argument("--rounds", type=_count, default=15, help="samples of each contestant (15)")
+    fast.add_argument("--shininess", type=float, default=32.0, help="exponent of the highlight (32)")
+    fast.add_argument("--points", type=_count, default=65536, help="most pixels to compare with the oracle (65536)")
+    first = commands.add_parser("start", help="seconds from the start of a process to its first image")
+    first.add_argument("--size", type=_count, default=256, help="side of the image (256)")
+    first.add_argument("--rounds", type=_count, default=7, help="processes of each case (7)")
+    for command in (fast, first):
+        command.add_argument("--seed", type=int, default=1, help="seed of the order of turns and of the pixels (1)")
+        command.add_argument("--json", action="store_true", help="print JSON, not tables")
+    return parser
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if not 1 <= number <= 1 << 20:
+        raise argparse.ArgumentTypeError(f"{number} is not from 1 to {1 << 20}")
+    return number
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,31 @@
+"""The accuracies that a command is asked for, as those that the scene can have."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from symrender_cg.errors import OutsidePlanError
+from symrender_cg.lower.variants import ACCURACIES, variant
+from symrender_cg.plan.bounds import require_single
+from symrender_cg.scene import Scene
+
+
+def accuracies_for(scene: Scene, asked: Sequence[str] | str) -> tuple[str, ...]:
+    """`all` -> every accuracy that the scene can have, the others named on stderr; a list -> that list.
+
+    Raises OutsidePlanError where a list asks for one that the scene cannot have.
+    """
+    frame = scene.in_camera_frame()
+    possible = []
+    for name in ACCURACIES if asked == "all" else asked:
+        try:
+            if variant(name).shading == "float32":
+                require_single(frame)
+        except OutsidePlanError as refusal:
+            if asked != "all":
+                raise
+            print(f"symrender_cg: {name} is left out: {refusal}", file=sys.stderr)
+            continue
+        possible.append(name)
+    return tuple(possible)
