@@ -11,7 +11,8 @@ static inline int unit_exponent(double length)
 }
 
 /* The k by which a light at (x, y, z) from the centre is scaled: the scene's own, unless the light is then still
- * farther than 2^farthest radii. Such a light shines in parallel to the last bit and is brought to about that distance. */
+ * farther than 2^farthest radii. Such a light shines in parallel to the last bit and is brought to about that
+ * distance. */
 static inline int light_exponent(int scene, double radius, double x, double y, double z, int farthest)
 {
     const double longest = fmax(fmax(fabs(x), fabs(y)), fmax(fabs(z), radius));
