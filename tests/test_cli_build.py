@@ -141,7 +141,7 @@ def test_the_command_in_a_kernel_makes_the_same_files_again(shell: Shell, tmp_pa
     assert command == "python -m symrender_cg build off_axis --accuracy single"
     for suffix in ("c", "h"):
         text = (first / "off_axis_sphere_single" / f"off_axis_sphere_single.{suffix}").read_text()
-        assert f"Regenerate with: {command}\n" in text
+        assert f"Regenerate with:\n *     {command}\n" in text
     shell(*shlex.split(command)[3:], "--out", second, "--passes")
     assert contents(second) == contents(first)
 

@@ -10,6 +10,15 @@ static inline int unit_exponent(double length)
     return -ilogb(length);
 }
 
+/* The factor that brings a point (x, y) of the image plane into the kernel's unit. Its ray's direction is all that counts:
+ * a point farther than `farthest` units is brought to about that distance, which turns its ray by less than 1 / farthest. */
+static inline double point_unit(double unit, double x, double y, double farthest)
+{
+    const double across = fabs(x), up = fabs(y);
+    const double nearer = farthest / (across > up ? across : up);
+    return nearer < unit ? nearer : unit;
+}
+
 /* The k by which a light at (x, y, z) from the centre is scaled: the scene's own, unless the light is then still
  * farther than 2^farthest radii. Such a light shines in parallel to the last bit and is brought to about that
  * distance. */

@@ -412,6 +412,13 @@ def _diffuse_claims() -> tuple[Claim, ...]:
     return (Claim(S("diffuse"), S("light_intensity") * S("diffuse"), given=same, keep=("n_dot_l",)),)
 
 
+def _gained_claims() -> tuple[Claim, ...]:
+    """Given that the new diffuse and specular are I_L times the textbook's: their gains hold I_L."""
+    terms = ("diffuse", "specular")
+    given = {name: S(name) / S("light_intensity") for name in terms}
+    return (Claim(S("lit"), S("lit"), given=given, keep=terms),)
+
+
 def _gained(program: ImageProgram) -> tuple[Definition, ...]:
     terms = [S(name) for name in ("diffuse", "specular") if name in program]
     return (Definition("lit", sp.Add(*terms), "intensity", "what the light adds; the gains hold its intensity"),)
@@ -500,7 +507,7 @@ FORMS: tuple[Form, ...] = (
         _diffuse_claims,
         brings=("diffuse",),
     ),
-    Form("gained", _gained, "a multiplication a pixel", "I_L (a + b) = I_L a + I_L b", tuple, brings=("lit",)),
+    Form("gained", _gained, "a multiplication a pixel", "I_L (a + b) = I_L a + I_L b", _gained_claims, brings=("lit",)),
     Form(
         "mirrored_ray",
         _mirrored_ray,

@@ -30,7 +30,7 @@ WIDTH = 120
 SUPPORT = {
     "inline.h": None,
     "span.h": None,
-    "units.h": ("unit_exponent", "light_exponent"),
+    "units.h": ("unit_exponent", "light_exponent", "point_unit"),
     "square.h": ("square",),
     "phong_power.h": ("power", "powerf", "power_of_cosine", "power_of_cosinef"),
     "double_double.h": ("dd_",),
@@ -71,6 +71,7 @@ def emit(
         if header == "inline.h"
         or (header == "exact_sign.h" and variant.exact)
         or (header == "span.h" and program.ends)
+        or (header == "units.h" and variant.exact and not program.ends)
         or (header == "double_double.h" and double_double)
         or (functions and header != "double_double.h" and uses & set(functions))
     ]

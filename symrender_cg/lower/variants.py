@@ -59,7 +59,20 @@ VARIANTS: tuple[Variant, ...] = (
         _STABLE_FORMS,
         exact=True,
         float64=frozenset(
-            {"x", "y", "from_left", "to_right", "chord", "facing2", "zero_power", "dx", "dy", "before_eye", "focal", "plane_unit"}
+            {
+                "x",
+                "y",
+                "from_left",
+                "to_right",
+                "chord",
+                "facing2",
+                "zero_power",
+                "dx",
+                "dy",
+                "before_eye",
+                "focal",
+                "plane_unit",
+            }
         ),
         double_double=_DOUBLE_DOUBLE,
         per_pixel_exact=_PER_PIXEL,

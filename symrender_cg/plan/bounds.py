@@ -21,6 +21,12 @@ LARGEST_RATIO_AT_EYE = 2.0**30
 LARGEST_RATIO_SINGLE = 2.0**60
 """The same for kernels that shade in float32: its square is still a float32."""
 
+LARGEST_VIEW = 2.0**100
+"""Largest ratio of half_height to the distance of the eye; 57 already see 178 degrees, an eye at a sphere needs 1e8."""
+
+LARGEST_VIEW_SINGLE = 2.0**30
+"""The same for kernels that shade in float32."""
+
 SMALLEST_LENGTH = 2.0**-900
 LARGEST_LENGTH = 2.0**1000
 
@@ -48,6 +54,7 @@ def require_supported(scene: Scene) -> None:
             raise OutsidePlanError(
                 f"{place}: {value} is below 2^-900 in the camera's frame; give the scene in another unit of length"
             )
+    _require_view(scene, LARGEST_VIEW, "")
     off_axis = sphere.center[0] != 0.0 or sphere.center[1] != 0.0
     at_eye = eye - sphere.center[2] <= sphere.radius
     limit = LARGEST_RATIO_AT_EYE if at_eye else LARGEST_RATIO_OFF_AXIS if off_axis else LARGEST_RATIO
@@ -60,10 +67,20 @@ def require_supported(scene: Scene) -> None:
 
 def require_single(scene: Scene) -> None:
     """Raises OutsidePlanError where float32 cannot hold the squares that shading in it needs."""
+    _require_view(scene, LARGEST_VIEW_SINGLE, " in float32: use 'double'")
     if (ratio := spread(scene)) > LARGEST_RATIO_SINGLE:
         raise OutsidePlanError(
             f"spheres[0].radius: {scene.spheres[0].radius} is {ratio:.3g} times smaller than the eye's distance or "
             f"the offset of the centre; float32 reaches {LARGEST_RATIO_SINGLE:.3g}: use 'double'"
+        )
+
+
+def _require_view(scene: Scene, largest: float, remedy: str) -> None:
+    half_height, eye = scene.camera.half_height, scene.camera.eye[2]
+    if half_height is not None and half_height / largest > eye:
+        raise OutsidePlanError(
+            f"camera.half_height: {half_height} is more than {largest:.3g} times the distance of the eye, {eye}; kernels "
+            f"are not proved right for a view so wide{remedy}"
         )
 
 

@@ -30,7 +30,7 @@ def thread_count(threads: int | None, pixels: int) -> int:
 
 
 def over_rows(render: Callable[[int, int], None], height: int, threads: int) -> None:
-    """Calls render(begin, end) for blocks of rows that cover [0, height), on that many threads, the caller's among them.
+    """Calls render(begin, end) for blocks of rows that cover [0, height), on that many threads with the caller's.
 
     A thread of the pool that wakes late finds nothing left to do, and is not waited for.
     """

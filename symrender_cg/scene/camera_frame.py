@@ -29,7 +29,6 @@ def is_in_frame(camera: Camera) -> bool:
     return camera.look_at == ORIGIN and eye[:2] == (0.0, 0.0) and eye[2] > 0.0 and up[0] == 0.0 and up[1] > 0.0
 
 
-@lru_cache(maxsize=256)
 def in_camera_frame(scene: Scene) -> Scene:
     """The scene with Camera(eye=(0, 0, e), look_at=(0, 0, 0), up=(0, 1, 0), half_height=h); itself when it is that.
 
@@ -38,9 +37,16 @@ def in_camera_frame(scene: Scene) -> Scene:
     Multiplying all lengths by 2^k multiplies the result by exactly 2^k, short of subnormal numbers.
     """
     camera = scene.camera
+    if is_in_frame(camera) and camera.up == UP and camera.half_height is not None:
+        return scene
+    return _into_frame(scene)
+
+
+@lru_cache(maxsize=256)
+def _into_frame(scene: Scene) -> Scene:
+    """The same for a scene that is not in the frame yet; remembered, as a scene is drawn more than once."""
+    camera = scene.camera
     if is_in_frame(camera):
-        if camera.up == UP and camera.half_height is not None:
-            return scene
         e, spheres, lights = camera.eye[2], scene.spheres, scene.lights
     else:
         e, spheres, lights = _moved(scene)
