@@ -233,9 +233,9 @@ def _source_digest() -> str:
     """A digest of everything that the C text depends on: the sources of the compiler's stages and the templates."""
     package = Path(__file__).resolve().parent
     digest = hashlib.sha256()
-    files = [path for stage in ("plan", "derive", "lower", "emit") for path in (package / stage).glob("*.py")]
+    files = [path for stage in ("plan", "derive", "lower", "emit") for path in (package / stage).rglob("*.py")]
     files += [path for path in templates().rglob("*") if path.suffix in (".j2", ".h")]
-    for path in sorted(files, key=lambda p: (p.parent.name, p.name)):
+    for path in sorted(files, key=lambda p: p.parts[-3:]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 

@@ -87,14 +87,18 @@ GEOMETRIES: dict[str, tuple[Vector, float | None]] = {
 }
 """Name of the geometry in a plan -> centre, half_height, for the eye at (0, 0, 4) and radius 1."""
 
+_LIT_FROM: dict[str, Vector] = {"any_sphere": (-2.0, 3.0, 1.0)}
+"""Where a light shines on the side that is seen, if Chapter 1's does not."""
+
 _LIGHTS = {"": (0.7, 0.5), "_matte": (0.7, 0.0), "_specular": (0.0, 0.5), "_flat": (0.0, 0.0)}
 
 
-def scene_of(geometry: str, material: Phong | None = None, light: Vector = (5.0, 5.0, 10.0)) -> Scene:
-    """A scene of that geometry, by default with Chapter 1's material and light."""
+def scene_of(geometry: str, material: Phong | None = None, light: Vector | None = None) -> Scene:
+    """A scene of that geometry, by default with Chapter 1's material, lit from the side that is seen."""
     center, half_height = GEOMETRIES[geometry]
     sphere = Sphere(center, 1.0, material or Phong())
-    return Scene(Camera(half_height=half_height), (sphere,), (PointLight(light),))
+    position = light or _LIT_FROM.get(geometry, (5.0, 5.0, 10.0))
+    return Scene(Camera(half_height=half_height), (sphere,), (PointLight(position),))
 
 
 def structures() -> dict[str, Scene]:

@@ -25,9 +25,7 @@ from symrender_cg.scene import Scene
 
 X, Y, E, R = symbols("x y eye radius")
 LIGHT = sp.Matrix(symbols("light_x light_y light_z"))
-KA, KD, KS, N, INTENSITY, BACKGROUND = symbols(
-    "k_ambient k_diffuse k_specular shininess light_intensity background"
-)
+KA, KD, KS, N, INTENSITY, BACKGROUND = symbols("k_ambient k_diffuse k_specular shininess light_intensity background")
 
 
 @cache
@@ -43,7 +41,7 @@ def forced(*effects: str) -> ImageProgram:
 def vanishes(difference: sp.Expr, root: sp.Symbol, square: sp.Expr) -> bool:
     """Whether a rational expression in `root` is 0, given root^2 = square."""
     numerator = sp.expand(sp.fraction(sp.together(difference))[0])
-    return sp.expand(sp.rem(sp.Poly(numerator, root), sp.Poly(root**2 - square, root)).as_expr()) == 0
+    return bool(sp.expand(sp.rem(sp.Poly(numerator, root), sp.Poly(root**2 - square, root)).as_expr()) == 0)
 
 
 # ---- the seed's own formulas, written here once more

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import mpmath
 import numpy as np
@@ -115,7 +115,7 @@ def test_no_claim_holds_with_something_added_to_it(name: str, structure: str) ->
     for index, claim in enumerate(entry.claims()):
         claims = list(entry.claims())
         claims[index] = replace(claim, right=claim.right + symbol("radius"))
-        changed = replace(entry, claims=lambda made=tuple(claims): made)
+        changed = replace(entry, claims=partial(tuple, claims))
         proofs = prove_form(changed, image(structure))
         assert [proof.holds for proof in proofs] == [k != index for k in range(len(claims))]
 
@@ -197,4 +197,10 @@ def holds(condition: sp.Basic, known: dict[str, mpmath.mpf]) -> bool:
     if isinstance(condition, sp.Gt):
         return bool(left > right)
     assert isinstance(condition, sp.Lt | sp.Ge | sp.Le), condition
-    return bool(left < right if isinstance(condition, sp.Lt) else left >= right if isinstance(condition, sp.Ge) else left <= right)
+    return bool(
+        left < right
+        if isinstance(condition, sp.Lt)
+        else left >= right
+        if isinstance(condition, sp.Ge)
+        else left <= right
+    )

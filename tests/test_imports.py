@@ -101,7 +101,9 @@ def test_no_module_of_the_stages_is_imported_by_a_cycle() -> None:
 
 def modules_after(code: str, *arguments: str) -> set[str]:
     """Names of the modules that a fresh interpreter holds after running `code`."""
-    program = f"import sys\nsys.path.insert(0, {str(ROOT)!r})\n{code}\nimport json; print(json.dumps(sorted(sys.modules)))"
+    program = (
+        f"import sys\nsys.path.insert(0, {str(ROOT)!r})\n{code}\nimport json; print(json.dumps(sorted(sys.modules)))"
+    )
     command = [sys.executable, "-W", "error", "-c", program, *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -130,7 +132,9 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
 
 
 def test_a_scene_can_be_made_and_planned_without_numpy_or_sympy() -> None:
-    loaded = modules_after("from symrender_cg.scene import Scene; from symrender_cg.plan.plan import plan; plan(Scene.chapter1())")
+    loaded = modules_after(
+        "from symrender_cg.scene import Scene; from symrender_cg.plan.plan import plan; plan(Scene.chapter1())"
+    )
     assert not {"sympy", "numpy", "jinja2", "cffi"} & loaded
 
 

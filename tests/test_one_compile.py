@@ -35,7 +35,11 @@ def scenes_of_numbers(count: int, *, centred: bool) -> list[Scene]:
         eye = radius * depth
         center = (0.0, 0.0, 0.0)
         if not centred:
-            center = (radius * random.uniform(-1.0, 1.0), radius * random.uniform(0.1, 1.0), radius * random.uniform(-1.0, 0.4))
+            center = (
+                radius * random.uniform(-1.0, 1.0),
+                radius * random.uniform(0.1, 1.0),
+                radius * random.uniform(-1.0, 0.4),
+            )
         shininess = float(random.integers(0, 300)) if index % 2 else random.uniform(0.0, 300.0)
         material = Phong(random.uniform(0.0, 1.0), random.uniform(0.1, 1.0), random.uniform(0.1, 1.0), shininess)
         light = PointLight((random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(4, 9)), random.uniform(0.1, 2))
@@ -57,7 +61,9 @@ def test_a_moved_camera_and_a_moved_point_are_no_new_kernel(tmp_path: Path) -> N
     evaluate(scene, 0.0, 0.0, cache=tmp_path)
     before = counts()
     for step in range(10):
-        moved = Scene(Camera((0.1 * step, 1.0, 4.0), (0.2, 0.1 * step, 0.0), (0.1, 1.0, 0.0)), scene.spheres, scene.lights)
+        moved = Scene(
+            Camera((0.1 * step, 1.0, 4.0), (0.2, 0.1 * step, 0.0), (0.1, 1.0, 0.0)), scene.spheres, scene.lights
+        )
         evaluate(moved, [0.1 * step], 0.3, cache=tmp_path)
     assert grown(before) == (0, 0, 0, 10)
 
@@ -70,7 +76,9 @@ def test_each_structure_and_each_accuracy_is_a_kernel_of_its_own(tmp_path: Path)
     assert grown(before)[:2] == (9, 9)
 
 
-def test_another_process_would_recall_the_kernel_and_not_derive_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_process_would_recall_the_kernel_and_not_derive_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """An empty memory is what another process has: `derived` stays, and so does the value."""
     scene = Scene.chapter1(shininess=3.25)
     value = evaluate(scene, 0.1, 0.2, cache=tmp_path)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import sys
 import threading
+import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -87,7 +89,9 @@ def test_small_images_are_drawn_by_one_thread() -> None:
 
 @pytest.mark.parametrize("threads", [0, -1, 1.0, "2", True])
 def test_a_number_of_threads_that_is_none_is_refused(threads: object) -> None:
-    with pytest.raises(ArgumentError, match=r"threads: .* is not a number of threads; expected a whole number from 1 up"):
+    with pytest.raises(
+        ArgumentError, match=r"threads: .* is not a number of threads; expected a whole number from 1 up"
+    ):
         render_image(None, 8, 8, threads=threads)  # type: ignore[arg-type]
 
 
@@ -111,71 +115,56 @@ def test_threads_that_ask_first_at_once_share_one_kernel(tmp_path: object) -> No
     assert all(kernel is kernels[0] for kernel in kernels)
 
 
+def counted_during(call: Callable[[], object], attempts: int) -> list[int]:
+    """How far another Python thread counts during each call, until it has once; the calling thread gives nothing away.
+
+    The interpreter is kept from switching threads on its own, so that the other one counts only while `call` has
+    released the GIL; it sleeps between its steps, so that the caller gets it back.
+    """
+    count, stop, running = [0], threading.Event(), threading.Event()
+
+    def tick() -> None:
+        while not stop.is_set():
+            count[0] += 1
+            running.set()
+            time.sleep(1e-4)
+
+    advanced: list[int] = []
+    ticking, interval = threading.Thread(target=tick), sys.getswitchinterval()
+    ticking.start()
+    try:
+        running.wait()
+        sys.setswitchinterval(1000.0)
+        while len(advanced) < attempts and not any(advanced):
+            before = count[0]
+            call()
+            advanced.append(count[0] - before)
+    finally:
+        sys.setswitchinterval(interval)
+        stop.set()
+        ticking.join()
+    return advanced
+
+
 @pytest.mark.parametrize("entry", ["rows", "points"])
 def test_the_gil_is_released_while_a_kernel_runs(entry: str) -> None:
-    """A Python thread counts on while one C call draws; with the GIL held it could not take a single step.
-
-    The interpreter is kept from switching on its own, so that whatever is counted was counted during the call.
-    """
+    """A Python thread counts on while one C call draws; with the GIL held it could not take a single step."""
     scene = Scene.chapter1()
     kernel = compile_kernel(scene, "literal")
     numbers = kernel.numbers(numbers_of(scene))
     image = np.empty((1024, 1024))
     x, y = np.random.default_rng(1).uniform(-1.0, 1.0, (2, image.size))
-    values = np.empty(image.size)
-    count, stop, running = [0], threading.Event(), threading.Event()
-
-    def tick() -> None:
-        running.set()
-        while not stop.is_set():
-            count[0] += 1
-
-    advanced = []
-    ticking = threading.Thread(target=tick)
-    interval = sys.getswitchinterval()
-    ticking.start()
-    try:
-        running.wait()
-        sys.setswitchinterval(0.25)
-        for _ in range(4):
-            before = count[0]
-            if entry == "rows":
-                kernel.rows(image, numbers, pixel=2.5 / 1024, white=1.0, begin=0, end=1024)
-            else:
-                kernel.points(values, x, y, numbers, white=1.0)
-            advanced.append(count[0] - before)
-    finally:
-        sys.setswitchinterval(interval)
-        stop.set()
-        ticking.join()
-    assert min(advanced) > 0
+    calls: dict[str, Callable[[], None]] = {
+        "rows": lambda: kernel.rows(image, numbers, pixel=2.5 / 1024, white=1.0, begin=0, end=1024),
+        "points": lambda: kernel.points(image.reshape(-1), x, y, numbers, white=1.0),
+    }
+    assert any(counted_during(calls[entry], 100))
 
 
-def test_a_kernel_holding_the_gil_would_not_pass_the_test_above() -> None:
-    """The control: pure Python between two readings leaves the count where it was, as a call that holds the GIL would."""
-    count, stop, running = [0], threading.Event(), threading.Event()
-
-    def tick() -> None:
-        running.set()
-        while not stop.is_set():
-            count[0] += 1
-
-    ticking = threading.Thread(target=tick)
-    interval = sys.getswitchinterval()
-    ticking.start()
-    try:
-        running.wait()
-        sys.setswitchinterval(0.25)
-        advanced = []
-        for _ in range(4):
-            before = count[0]
-            sum(range(1000))
-            advanced.append(count[0] - before)
-    finally:
-        sys.setswitchinterval(interval)
-        stop.set()
-        ticking.join()
-    assert min(advanced) == 0
+def test_a_call_that_keeps_the_gil_is_told_from_one_that_does_not() -> None:
+    """The control of the test above."""
+    assert not any(counted_during(lambda: sum(range(20_000)), 50))
+    assert any(counted_during(lambda: time.sleep(0.002), 50))
 
 
 def test_a_spawned_process_draws_by_a_pool_of_its_own() -> None:

@@ -79,7 +79,7 @@ def _require_view(scene: Scene, largest: float, remedy: str) -> None:
     half_height, eye = scene.camera.half_height, scene.camera.eye[2]
     if half_height is not None and half_height / largest > eye:
         raise OutsidePlanError(
-            f"camera.half_height: {half_height} is more than {largest:.3g} times the distance of the eye, {eye}; kernels "
+            f"camera.half_height: {half_height} is more than {largest:.3g} times the eye's distance {eye}; kernels "
             f"are not proved right for a view so wide{remedy}"
         )
 
