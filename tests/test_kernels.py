@@ -384,8 +384,9 @@ def test_a_light_exactly_at_the_hit_point_adds_nothing(entry: Evaluator, radius:
 @pytest.mark.parametrize("shininess", [0.0, 1e-320, 1e-50, 0.5, 1.0, 1e6, 1e12, 1e39, 1e300])
 @pytest.mark.parametrize("light", [(5.0, 5.0, 10.0), (0.0, 0.0, 10.0), (-5.0, 2.0, -9.0)])
 def test_any_shininess_is_right(entry: Evaluator, shininess: float, light: Vector) -> None:
-    """0^0 = 1 also where r.v < 0, and 0^n = 0 for the smallest n > 0. Measured: double 1.2e-15, single 1.1e-6, at n = 0.5
-    near r.v = 0, where a power below 1 magnifies the error of its base.
+    """0^0 = 1 also where r.v < 0, and 0^n = 0 for the smallest n > 0.
+
+    Measured: double 1.2e-15, single 1.1e-6, at n = 0.5 near r.v = 0, where a power below 1 magnifies the error.
     """
     scene = Scene.chapter1(shininess=shininess, light=light)
     x, y = square_of_points(scene, 31)  # the middle one looks straight at the mirror image of the second light

@@ -1,4 +1,5 @@
-/* centred_sphere_double: one Phong sphere, one point light, accuracy "double" (symrender_cg 0.1.0)
+/* centred_sphere_double: one Phong sphere, one point light
+ * Accuracy "double" (symrender_cg 0.1.0)
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy double
  *
@@ -265,8 +266,8 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
     }
 }
 
-void centred_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count,
-    double white_limit, const centred_sphere_double_scene *scene)
+void centred_sphere_double_points(double *values, const double *x, const double *y,
+    ptrdiff_t count, double white_limit, const centred_sphere_double_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;

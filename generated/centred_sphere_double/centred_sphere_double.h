@@ -1,4 +1,5 @@
-/* centred_sphere_double: the image of one Phong-shaded sphere, accuracy "double" (symrender_cg 0.1.0).
+/* centred_sphere_double: the image of one Phong-shaded sphere
+ * Accuracy "double" (symrender_cg 0.1.0)
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy double
  */
@@ -33,8 +34,8 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
     const centred_sphere_double_scene *scene, int row_begin, int row_end);
 
 /* Writes the intensities at points (x[i], y[i]) of the image plane; above white they are written as white. */
-void centred_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count,
-    double white, const centred_sphere_double_scene *scene);
+void centred_sphere_double_points(double *values, const double *x, const double *y,
+    ptrdiff_t count, double white, const centred_sphere_double_scene *scene);
 
 #ifdef __cplusplus
 }

@@ -1,4 +1,5 @@
-/* centred_sphere_double_baked: one Phong sphere, one point light, accuracy "double" (symrender_cg 0.1.0)
+/* centred_sphere_double_baked: one Phong sphere, one point light
+ * Accuracy "double" (symrender_cg 0.1.0)
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy double --bake
  *
@@ -211,8 +212,8 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
     }
 }
 
-void centred_sphere_double_baked_points(double *values, const double *x, const double *y, ptrdiff_t count,
-    double white_limit)
+void centred_sphere_double_baked_points(double *values, const double *x, const double *y,
+    ptrdiff_t count, double white_limit)
 {
     const double unit = plane_unit;
     const double white = white_limit;

@@ -1,4 +1,5 @@
-/* centred_sphere_double_baked: the image of one Phong-shaded sphere, accuracy "double" (symrender_cg 0.1.0).
+/* centred_sphere_double_baked: the image of one Phong-shaded sphere
+ * Accuracy "double" (symrender_cg 0.1.0)
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy double --bake
  */
@@ -17,8 +18,8 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
     int row_begin, int row_end);
 
 /* Writes the intensities at points (x[i], y[i]) of the image plane; above white they are written as white. */
-void centred_sphere_double_baked_points(double *values, const double *x, const double *y, ptrdiff_t count,
-    double white);
+void centred_sphere_double_baked_points(double *values, const double *x, const double *y,
+    ptrdiff_t count, double white);
 
 #ifdef __cplusplus
 }

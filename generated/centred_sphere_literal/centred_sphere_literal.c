@@ -1,4 +1,5 @@
-/* centred_sphere_literal: one Phong sphere, one point light, accuracy "literal" (symrender_cg 0.1.0)
+/* centred_sphere_literal: one Phong sphere, one point light
+ * Accuracy "literal" (symrender_cg 0.1.0)
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy literal
  *
@@ -150,8 +151,8 @@ void centred_sphere_literal_rows(double *image, ptrdiff_t stride, const symrende
     }
 }
 
-void centred_sphere_literal_points(double *values, const double *x, const double *y, ptrdiff_t count,
-    double white_limit, const centred_sphere_literal_scene *scene)
+void centred_sphere_literal_points(double *values, const double *x, const double *y,
+    ptrdiff_t count, double white_limit, const centred_sphere_literal_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = 1.0;

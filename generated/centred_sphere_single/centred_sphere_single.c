@@ -1,4 +1,5 @@
-/* centred_sphere_single: one Phong sphere, one point light, accuracy "single" (symrender_cg 0.1.0)
+/* centred_sphere_single: one Phong sphere, one point light
+ * Accuracy "single" (symrender_cg 0.1.0)
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy single
  *
@@ -285,8 +286,8 @@ void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_
     }
 }
 
-void centred_sphere_single_points(float *values, const double *x, const double *y, ptrdiff_t count,
-    double white_limit, const centred_sphere_single_scene *scene)
+void centred_sphere_single_points(float *values, const double *x, const double *y,
+    ptrdiff_t count, double white_limit, const centred_sphere_single_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;

@@ -1,4 +1,5 @@
-/* off_axis_sphere_double: one Phong sphere, one point light, accuracy "double" (symrender_cg 0.1.0)
+/* off_axis_sphere_double: one Phong sphere, one point light
+ * Accuracy "double" (symrender_cg 0.1.0)
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build off_axis --accuracy double
  *
@@ -317,8 +318,8 @@ void off_axis_sphere_double_rows(double *image, ptrdiff_t stride, const symrende
     }
 }
 
-void off_axis_sphere_double_points(double *values, const double *x, const double *y, ptrdiff_t count,
-    double white_limit, const off_axis_sphere_double_scene *scene)
+void off_axis_sphere_double_points(double *values, const double *x, const double *y,
+    ptrdiff_t count, double white_limit, const off_axis_sphere_double_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;

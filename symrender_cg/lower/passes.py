@@ -105,7 +105,12 @@ def lower_powers(program: KernelProgram, functions: dict[str, str]) -> KernelPro
         for power in sorted(value.atoms(sp.Pow), key=sp.default_sort_key):
             if power.exp.is_Rational and abs(power.exp) in (1, 2, sp.Rational(1, 2)):
                 continue
-            if power.exp.is_Integer and power.exp > 0:
+            if power.exp.is_Rational and power.exp.q == 2 and power.exp > 1:
+                chain, result = _product_chain(step, power.base, int(power.exp))
+                root = replace(step, name=f"{step.name}_root", value=sp.sqrt(power.base), meaning="", source="")
+                steps += [*chain, root]
+                value = value.xreplace({power: result * root.symbol})
+            elif power.exp.is_Integer and power.exp > 0:
                 chain, result = _product_chain(step, power.base, int(power.exp))
                 steps += chain
                 value = value.xreplace({power: result})

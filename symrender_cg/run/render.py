@@ -86,7 +86,7 @@ def evaluate(
     Raises ArgumentError for points that are not finite real numbers.
     """
     chosen = load_scene(scene)
-    points_x, points_y = np.broadcast_arrays(_coordinates("x", x), _coordinates("y", y))
+    points_x, points_y = _points(x, y)
     if backend == "numpy":
         return _numpy_backend(chosen.in_camera_frame(), points_x, points_y, accuracy, clip)
     _require_native(backend)
@@ -139,6 +139,18 @@ def _side(name: str, value: int) -> int:
             f"{name}: {value!r} is not a number of pixels; expected a whole number from 1 to {LARGEST_SIDE}"
         )
     return int(value)
+
+
+def _points(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    points_x, points_y = _coordinates("x", x), _coordinates("y", y)
+    try:
+        np.broadcast_shapes(points_x.shape, points_y.shape)
+    except ValueError:
+        raise ArgumentError(
+            f"x and y: shapes {points_x.shape} and {points_y.shape} do not broadcast; expected one shape, or numbers"
+        ) from None
+    broadcast_x, broadcast_y = np.broadcast_arrays(points_x, points_y)
+    return broadcast_x, broadcast_y
 
 
 def _coordinates(name: str, values: ArrayLike) -> NDArray[np.float64]:
