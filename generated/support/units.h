@@ -11,7 +11,7 @@ static inline int unit_exponent(double length)
 }
 
 /* The factor that brings a point (x, y) of the image plane into the kernel's unit. Only its ray's direction counts:
- * a point farther than `farthest` units is brought to about that distance, a turn of its ray by less than 1 / farthest. */
+ * a point farther than `farthest` units is brought to about that distance; its ray turns by less than 1 / farthest. */
 static inline double point_unit(double unit, double x, double y, double farthest)
 {
     const double across = fabs(x), up = fabs(y);
