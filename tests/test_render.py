@@ -248,7 +248,7 @@ def test_what_is_no_point_is_refused_with_its_place(case: str, backend: str) -> 
 
 
 def test_points_that_do_not_broadcast_are_refused() -> None:
-    with pytest.raises(ArgumentError, match=r"x, y: shapes \(3,\) and \(4,\) do not broadcast"):
+    with pytest.raises(ArgumentError, match=r"x and y: shapes \(3,\) and \(4,\) do not broadcast"):
         evaluate(None, np.zeros(3), np.zeros(4))
 
 
