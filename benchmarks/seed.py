@@ -7,8 +7,6 @@ what the kernels are measured against.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,42 +14,14 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 
-@cache
-def cell_2() -> tuple[tuple[Any, ...], Any]:
-    """Cell 2: (params, I_img), the image as one sympy expression."""
-    import sympy as sp
-
-    x, y = sp.symbols("x y", real=True)
-    R, e = sp.symbols("R e", positive=True)
-    lx, ly, lz = sp.symbols("l_x l_y l_z", real=True)
-    ka, kd, ks, n = sp.symbols("k_a k_d k_s n", positive=True)
-    E = sp.Matrix([0, 0, e])
-    D = sp.Matrix([x, y, -e])
-    A = D.dot(D)
-    b = E.dot(D)
-    c = e**2 - R**2
-    disc = sp.expand(b**2 - A * c)
-    t_hit = sp.simplify((-b - sp.sqrt(disc)) / A)
-    P = (E + t_hit * D).applyfunc(sp.simplify)
-    N = P / R
-    L = sp.Matrix([lx, ly, lz])
-    w = L - P
-    w_hat = w / sp.sqrt(w.dot(w))
-    v_hat = -D / sp.sqrt(A)
-    ndl = sp.simplify(N.dot(w_hat))
-    r_vec = 2 * ndl * N - w_hat
-    rdv = sp.simplify(r_vec.dot(v_hat))
-    I_shade = ka + kd * sp.Max(0, ndl) + ks * sp.Max(0, rdv) ** n
-    I_img = sp.Piecewise((I_shade, disc >= 0), (0, True))
-    return (x, y, R, e, lx, ly, lz, ka, kd, ks, n), I_img
-
-
 def cell_3(*, cse: bool = False) -> Callable[..., FloatArray]:
     """Cell 3: f_img = lambdify(params, I_img); with cse=True what sympy can do about its swelling."""
     import sympy as sp
 
-    params, I_img = cell_2()
-    function: Callable[..., FloatArray] = sp.lambdify(params, I_img, modules="numpy", cse=cse)
+    from symrender_cg.reference.seed import cell_2
+
+    seed = cell_2()
+    function: Callable[..., FloatArray] = sp.lambdify(seed.parameters, seed.I_img, modules="numpy", cse=cse)
     return function
 
 

@@ -31,8 +31,7 @@ import numpy as np
 from symrender_cg.build.cache import Cache, default_root
 from symrender_cg.build.library import CachedKernel
 from symrender_cg.lower.variants import Variant, variant
-from symrender_cg.plan.bounds import require_single
-from symrender_cg.plan.plan import Plan, plan
+from symrender_cg.plan.plan import Plan, plan, require_format
 from symrender_cg.resources import templates
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.numbers import numbers_of
@@ -97,8 +96,7 @@ def compile_kernel(
     """The kernel for a scene: from memory, from the cache on disk, or derived, emitted and compiled now."""
     chosen = variant(accuracy)
     scene_plan = _planned(scene, tuple(force))
-    if chosen.shading == "float32":
-        require_single(scene.in_camera_frame())
+    require_format(scene, scene_plan, chosen.shading)
     root = Path(cache) if cache is not None else default_root()
     baked = tuple(sorted(numbers_of(scene).items())) if bake else ()
     key = (scene_plan.key, chosen.name, baked, portable, root)

@@ -21,6 +21,7 @@ from symrender_cg.derive.symbols import INPUTS, latex_names, symbol, symbols
 from symrender_cg.pipeline import translate
 from symrender_cg.plan.plan import plan
 from symrender_cg.reference import points
+from symrender_cg.reference import seed as seed_cells
 from symrender_cg.scene import Scene
 
 X, Y, E, R = symbols("x y eye radius")
@@ -278,29 +279,10 @@ def test_a_symbol_has_the_same_assumptions_wherever_it_is_made() -> None:
 
 def test_cell_2_swells_as_it_did_and_the_program_does_not() -> None:
     """Chapter 1, Cell 2, its own code and its own operation counts under sympy 1.14; ours are a tenth."""
-    x, y = sp.symbols("x y", real=True)
-    R, e = sp.symbols("R e", positive=True)
-    lx, ly, lz = sp.symbols("l_x l_y l_z", real=True)
-    ka, kd, ks, n = sp.symbols("k_a k_d k_s n", positive=True)
-    E = sp.Matrix([0, 0, e])
-    D = sp.Matrix([x, y, -e])
-    A = D.dot(D)
-    b = E.dot(D)
-    c = e**2 - R**2
-    disc = sp.expand(b**2 - A * c)
-    t_hit = sp.simplify((-b - sp.sqrt(disc)) / A)
-    P = (E + t_hit * D).applyfunc(sp.simplify)
-    N = P / R
-    L = sp.Matrix([lx, ly, lz])
-    w = L - P
-    w_hat = w / sp.sqrt(w.dot(w))
-    v_hat = -D / sp.sqrt(A)
-    ndl = sp.simplify(N.dot(w_hat))
-    r_vec = 2 * ndl * N - w_hat
-    rdv = sp.simplify(r_vec.dot(v_hat))
-    shade = ka + kd * sp.Max(0, ndl) + ks * sp.Max(0, rdv) ** n
-    img = sp.Piecewise((shade, disc >= 0), (0, True))
-    counted = [int(sp.count_ops(entry)) for entry in (t_hit, ndl, rdv, shade, img)]
+    seed = seed_cells.cell_2()
+    x, y, R, e, lx, ly, lz, ka, kd, ks, n = seed.parameters
+    img = seed.I_img
+    counted = list(seed.swell().values())
     if sp.__version__.startswith("1.14"):
         assert counted == [29, 284, 723, 1014, 1034]
     assert 10 * image("centred_sphere").operations() <= counted[-1]

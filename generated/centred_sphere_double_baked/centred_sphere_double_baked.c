@@ -3,7 +3,9 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy double --bake
  *
- * promise  about 1e-15 absolute on ordinary scenes; no overflow; hit or miss never wrong
+ * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
+ *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
+ *          wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone

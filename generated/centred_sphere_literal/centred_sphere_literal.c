@@ -11,6 +11,7 @@
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
+ *          numbers above are those of the scene it was written for; any scene with the same effects may call it
  * ops      once: frame 3 mul 1 add 1 div
  *          a row: 1 mul
  *          a pixel: 23 mul 17 add 8 div 3 sqrt 3 max 1 select 1 call

@@ -3,7 +3,7 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy single
  *
- * promise  a few units of 1e-6 on the unclipped field; hit or miss never wrong
+ * promise  a few units of 1e-6 on the unclipped field, under the conditions of double; hit or miss never wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone
@@ -11,6 +11,7 @@
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
+ *          numbers above are those of the scene it was written for; any scene with the same effects may call it
  * ops      once: frame 4 mul 3 div 1 select 20 call
  *          a row: 1 mul 5 call
  *          a pixel: 38 mul 27 add 2 div 2 sqrt 2 max 2 select 1 call

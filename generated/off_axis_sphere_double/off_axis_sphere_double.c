@@ -3,7 +3,9 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build off_axis --accuracy double
  *
- * promise  about 1e-15 absolute on ordinary scenes; no overflow; hit or miss never wrong
+ * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
+ *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
+ *          wrong
  * in       sphere off the axis
  *          diffuse term
  *          specular term
@@ -12,6 +14,7 @@
  *          gated specular: the material asks for the specular term as Phong wrote it, not gated by n.l > 0
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
+ *          numbers above are those of the scene it was written for; any scene with the same effects may call it
  * ops      once: frame 3 mul 3 add 4 div 1 select 40 call
  *          a row: 4 mul 2 add 16 call
  *          a pixel: 47 mul 34 add 2 div 2 sqrt 2 max 2 select 1 call

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from symrender_cg.errors import OutsidePlanError
 from symrender_cg.lower.variants import ACCURACIES, variant
-from symrender_cg.plan.bounds import require_single
+from symrender_cg.plan.plan import plan, require_format
 from symrender_cg.scene import Scene
 
 
@@ -16,12 +16,11 @@ def accuracies_for(scene: Scene, asked: Sequence[str] | str) -> tuple[str, ...]:
 
     Raises OutsidePlanError where a list asks for one that the scene cannot have.
     """
-    frame = scene.in_camera_frame()
+    found = plan(scene)
     possible = []
     for name in ACCURACIES if asked == "all" else asked:
         try:
-            if variant(name).shading == "float32":
-                require_single(frame)
+            require_format(scene, found, variant(name).shading)
         except OutsidePlanError as refusal:
             if asked != "all":
                 raise

@@ -92,7 +92,9 @@ class ImageProgram:
 
     def as_piecewise(self) -> sp.Piecewise:
         """The image as one expression: Piecewise((shading, hit), (background, True))."""
-        return sp.Piecewise((self.closed(self.value), self.condition()), (symbol(self.background), True))
+        return sp.Piecewise(
+            (self.closed(self.value), self.condition()), (symbol(self.background), True), evaluate=False
+        )
 
     def replacing(self, definitions: tuple[Definition, ...], *, keep: tuple[str, ...] = ()) -> ImageProgram:
         """The same program with other definitions, those that nothing uses and `keep` does not name left out."""

@@ -54,7 +54,7 @@ class Variant:
 VARIANTS: tuple[Variant, ...] = (
     Variant(
         "single",
-        "a few units of 1e-6 on the unclipped field; hit or miss never wrong",
+        "a few units of 1e-6 on the unclipped field, under the conditions of double; hit or miss never wrong",
         "float32",
         _STABLE_FORMS,
         exact=True,
@@ -86,7 +86,8 @@ VARIANTS: tuple[Variant, ...] = (
     ),
     Variant(
         "double",
-        "about 1e-15 absolute on ordinary scenes; no overflow; hit or miss never wrong",
+        "about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated highlight may "
+        "be switched wrongly within rounding of the terminator); no overflow; hit or miss never wrong",
         "float64",
         _STABLE_FORMS,
         exact=True,

@@ -18,6 +18,9 @@ LARGEST_RATIO_OFF_AXIS = 2.0**50
 LARGEST_RATIO_AT_EYE = 2.0**30
 """The same for a sphere that reaches the plane of the eye: the sign of m.D is then certain wherever disc's is."""
 
+LARGEST_RATIO_AT_EYE_SINGLE = 2.0**15
+"""The same in float32: the rays to such a sphere reach as many times beyond the distance of the image plane."""
+
 LARGEST_RATIO_SINGLE = 2.0**60
 """The same for kernels that shade in float32: its square is still a float32."""
 
@@ -65,13 +68,14 @@ def require_supported(scene: Scene) -> None:
         )
 
 
-def require_single(scene: Scene) -> None:
+def require_single(scene: Scene, *, at_eye: bool) -> None:
     """Raises OutsidePlanError where float32 cannot hold the squares that shading in it needs."""
     _require_view(scene, LARGEST_VIEW_SINGLE, " in float32: use 'double'")
-    if (ratio := spread(scene)) > LARGEST_RATIO_SINGLE:
+    limit = LARGEST_RATIO_AT_EYE_SINGLE if at_eye else LARGEST_RATIO_SINGLE
+    if (ratio := spread(scene)) > limit:
         raise OutsidePlanError(
             f"spheres[0].radius: {scene.spheres[0].radius} is {ratio:.3g} times smaller than the eye's distance or "
-            f"the offset of the centre; float32 reaches {LARGEST_RATIO_SINGLE:.3g}: use 'double'"
+            f"the offset of the centre; float32 reaches {limit:.3g}: use 'double'"
         )
 
 

@@ -36,6 +36,11 @@ class Effect:
     optional: bool = True
 
 
+FARTHEST_ASIDE = 256
+"""How far off the axis a sphere may be seen, in its depth: the normal from the image of the centre loses so many units
+of its last place, and beyond it the kernel for a sphere in the plane of the eye is the accurate one."""
+
+
 def _off_axis(scene: Scene) -> Finding:
     x, y, z = scene.spheres[0].center
     if x == y == z == 0.0:
@@ -48,6 +53,13 @@ def _front_test(scene: Scene) -> Finding:
     eye = Fraction(scene.camera.eye[2])
     depth = eye - Fraction(sphere.center[2])
     margin = float(depth - Fraction(sphere.radius))
+    aside = max(abs(sphere.center[0]), abs(sphere.center[1]))
+    if depth > Fraction(sphere.radius) and Fraction(aside) > FARTHEST_ASIDE * depth:
+        return Finding(
+            True,
+            f"the sphere is seen {aside / float(depth):.3g} times its depth off the axis, all but in the eye's plane",
+            margin,
+        )
     if depth > Fraction(sphere.radius):
         return Finding(
             False,

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from symrender_cg.errors import ArgumentError
-from symrender_cg.plan.bounds import require_supported
+from symrender_cg.plan.bounds import require_single, require_supported
 from symrender_cg.plan.effects import EFFECTS, Effect, Finding
 from symrender_cg.scene import Scene
 
@@ -81,6 +81,12 @@ def plan(scene: Scene, *, force: Iterable[str] = ()) -> Plan:
     frame = scene.in_camera_frame()
     require_supported(frame)
     return Plan(tuple(_decide(effect, effect.examine(frame), effect.name in forced) for effect in EFFECTS))
+
+
+def require_format(scene: Scene, found: Plan, shading: str) -> None:
+    """Raises OutsidePlanError where kernels that shade in this format are not proved right for the scene."""
+    if shading == "float32":
+        require_single(scene.in_camera_frame(), at_eye=found.needs("front_test"))
 
 
 def _decide(effect: Effect, finding: Finding, forced: bool) -> Decision:
