@@ -18,7 +18,7 @@ def cell_3(*, cse: bool = False) -> Callable[..., FloatArray]:
     """Cell 3: f_img = lambdify(params, I_img); with cse=True what sympy can do about its swelling."""
     import sympy as sp
 
-    from symrender_cg.reference.seed import cell_2
+    from symrender_cg.derive.seed import cell_2
 
     seed = cell_2()
     function: Callable[..., FloatArray] = sp.lambdify(seed.parameters, seed.I_img, modules="numpy", cse=cse)

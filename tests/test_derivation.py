@@ -13,6 +13,7 @@ import pytest
 import sympy as sp
 from evaluators import STRUCTURES, scene_of
 
+from symrender_cg.derive import seed as seed_cells
 from symrender_cg.derive.exact import sign_tests
 from symrender_cg.derive.image import centred, derive
 from symrender_cg.derive.program import Definition, ImageProgram
@@ -21,7 +22,6 @@ from symrender_cg.derive.symbols import INPUTS, latex_names, symbol, symbols
 from symrender_cg.pipeline import translate
 from symrender_cg.plan.plan import plan
 from symrender_cg.reference import points
-from symrender_cg.reference import seed as seed_cells
 from symrender_cg.scene import Scene
 
 X, Y, E, R = symbols("x y eye radius")

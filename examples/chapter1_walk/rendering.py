@@ -18,6 +18,7 @@ from chapter1_walk import seed as seed_cells
 from chapter1_walk.lab import Finding, FloatArray, Lab, ns_a_pixel, ns_of_kernel
 from chapter1_walk.pictures import Gallery
 from symrender_cg import Scene, render_image, translate
+from symrender_cg.derive import seed as seed_derivation
 from symrender_cg.derive.symbols import symbol
 from symrender_cg.pipeline import Translation
 from symrender_cg.reference import oracle
@@ -47,9 +48,9 @@ def cell_1(scene: Scene, size: int) -> tuple[FloatArray, list[Finding]]:
     ]
 
 
-def cell_2(scene: Scene, gallery: Gallery, console: Console) -> tuple[seed_cells.SeedImage, list[Finding]]:
+def cell_2(scene: Scene, gallery: Gallery, console: Console) -> tuple[seed_derivation.SeedImage, list[Finding]]:
     """The seed derives one expression; we derive named definitions. Same mathematics, checked to 50 digits."""
-    seed = seed_cells.cell_2()
+    seed = seed_derivation.cell_2()
     start = time.perf_counter()
     ours = translate(scene, "literal")
     seconds = time.perf_counter() - start
@@ -162,7 +163,7 @@ def cell_4(lab: Lab) -> list[Finding]:
     ]
 
 
-def _digits_of_agreement(seed: seed_cells.SeedImage, ours: Translation) -> int:
+def _digits_of_agreement(seed: seed_derivation.SeedImage, ours: Translation) -> int:
     """Digits, of 50 computed, to which the two closed forms agree at 20 points of 20 scenes (seeded)."""
     lengths = ("x", "y", "radius", "eye", "light_x", "light_y", "light_z")
     names = (*lengths, "k_ambient", "k_diffuse", "k_specular", "shininess")

@@ -13,7 +13,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from symrender_cg.reference.seed import SeedImage
+from symrender_cg.derive.seed import SeedImage
 
 FloatArray = NDArray[np.float64]
 

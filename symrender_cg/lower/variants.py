@@ -86,8 +86,8 @@ VARIANTS: tuple[Variant, ...] = (
     ),
     Variant(
         "double",
-        "about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated highlight may "
-        "be switched wrongly within rounding of the terminator); no overflow; hit or miss never wrong",
+        "about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated highlight "
+        "may be switched wrongly within rounding of the terminator); no overflow; hit or miss never wrong",
         "float64",
         _STABLE_FORMS,
         exact=True,
