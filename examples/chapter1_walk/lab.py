@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from chapter1_walk.pictures import Gallery
-from chapter1_walk.seed import SeedImage
 from symrender_cg import Scene, compile_kernel, render_image
+from symrender_cg.derive.seed import SeedImage
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
