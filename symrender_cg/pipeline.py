@@ -236,9 +236,3 @@ def _source_digest() -> str:
     for path in sorted(files, key=lambda p: p.parts[-3:]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def _forget_kernels() -> None:
-    """Drops the kernels of this process, so that the next call asks the cache on disk."""
-    with _guard:
-        _kernels.clear()

@@ -270,11 +270,10 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
 }
 
 void centred_sphere_double_points(double *values, const double *x, const double *y,
-    ptrdiff_t count, double white_limit, const centred_sphere_double_scene *scene)
+    ptrdiff_t count, double white, const centred_sphere_double_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;
-    const double white = white_limit;
     const double background = at_most(scene->background, white);
 
     for (ptrdiff_t block = 0; block < count; block += POINTS) {

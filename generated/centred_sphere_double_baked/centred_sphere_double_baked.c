@@ -215,10 +215,9 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
 }
 
 void centred_sphere_double_baked_points(double *values, const double *x, const double *y,
-    ptrdiff_t count, double white_limit)
+    ptrdiff_t count, double white)
 {
     const double unit = plane_unit;
-    const double white = white_limit;
     const double background_here = at_most(background, white);
 
     for (ptrdiff_t block = 0; block < count; block += POINTS) {

@@ -153,11 +153,10 @@ void centred_sphere_literal_rows(double *image, ptrdiff_t stride, const symrende
 }
 
 void centred_sphere_literal_points(double *values, const double *x, const double *y,
-    ptrdiff_t count, double white_limit, const centred_sphere_literal_scene *scene)
+    ptrdiff_t count, double white, const centred_sphere_literal_scene *scene)
 {
     const frame f = frame_of(scene);
     const double unit = 1.0;
-    const double white = white_limit;
     const double background = at_most(scene->background, white);
 
     for (ptrdiff_t i = 0; i < count; ++i) {
