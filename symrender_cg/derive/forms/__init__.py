@@ -1,8 +1,8 @@
 """The registry of forms: algebraically equal ways to compute the named quantities of the derivation.
 
 A form states the definitions that it brings, the scenes it is for, what it removes, and its claims: what each new
-quantity equals in the textbook's derivation. `proofs.prove_form` shows every claim's difference to be 0; the tests run it
-over the whole registry. Adding a form is adding one entry in one of the modules of this package.
+quantity equals in the textbook's derivation. `proofs.prove_form` shows every claim's difference to be 0; the tests run
+it over the whole registry. Adding a form is adding one entry in one of the modules of this package.
 
 The forms below measure lengths of the scene in radii and write f for the distance of the image plane from the eye,
 which is e: rays may be scaled apart from the scene, as only their direction counts.
