@@ -6,11 +6,12 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from rich.console import Console
 
 import benchmarks
-from benchmarks import speed, start
+from benchmarks import agreement, scaling, speed, start
 from symrender_cg.errors import SymrenderError
 
 
@@ -32,9 +33,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _measured(options: argparse.Namespace, told: Callable[[str], None]) -> speed.Report | start.Report:
+Report = speed.Report | start.Report | agreement.Report | scaling.Report
+
+
+def _measured(options: argparse.Namespace, told: Callable[[str], None]) -> Report:
     if options.command == "start":
         return start.measure_start(options.size, options.rounds, options.seed, told)
+    if options.command == "agreement":
+        size, rounds, seed = options.size, options.rounds, options.seed
+        return agreement.measure_agreement(options.scenes, size, rounds, seed, options.out, told)
+    if options.command == "scaling":
+        counts = options.counts or (scaling.QUICK_COUNTS if options.quick else scaling.COUNTS)
+        rounds = options.rounds or (3 if options.quick else 9)
+        return scaling.measure_scaling(counts, options.size, rounds, options.seed, told)
     return speed.measure_speed(options.size, options.rounds, options.shininess, options.points, options.seed, told)
 
 
@@ -53,7 +64,17 @@ def _parser() -> argparse.ArgumentParser:
     first = commands.add_parser("start", help="seconds from the start of a process to its first image")
     first.add_argument("--size", type=_count, default=256, help="side of the image (256)")
     first.add_argument("--rounds", type=_count, default=7, help="processes of each case (7)")
-    for command in (fast, first):
+    peers = commands.add_parser("agreement", help="pictures and geometry beside POV-Ray's and Mitsuba's")
+    peers.add_argument("scenes", nargs="*", help="built-in names or TOML files (all built-in scenes)")
+    peers.add_argument("--size", type=_count, default=512, help="side of the image (512)")
+    peers.add_argument("--rounds", type=_count, default=5, help="samples of each time (5)")
+    peers.add_argument("--out", type=Path, help="folder for pictures: ours, the peer's, 100 times the difference")
+    many = commands.add_parser("scaling", help="milliseconds against the number of spheres, beside POV-Ray and Mitsuba")
+    many.add_argument("--counts", type=_count, nargs="+", help="numbers of spheres (1 10 100 1000 10000)")
+    many.add_argument("--size", type=_count, default=512, help="side of the image (512)")
+    many.add_argument("--rounds", type=_count, help="samples of each contestant (9)")
+    many.add_argument("--quick", action="store_true", help="to 100 spheres in 3 rounds")
+    for command in (fast, first, peers, many):
         command.add_argument("--seed", type=int, default=1, help="seed of the order of turns and of the pixels (1)")
         command.add_argument("--json", action="store_true", help="print JSON, not tables")
     return parser

@@ -26,12 +26,25 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from symrender_cg.pipeline import compile_kernel, statistics, translate
-    from symrender_cg.run.render import evaluate, render_image
-    from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere, load_scene
+    from symrender_cg.run.render import evaluate, render_image, render_layers
+    from symrender_cg.scene import (
+        Camera,
+        DirectionalLight,
+        Gradient,
+        Phong,
+        Plane,
+        PointLight,
+        Scene,
+        Sphere,
+        load_scene,
+    )
 
 _HOME = {
     "Camera": "scene",
+    "DirectionalLight": "scene",
+    "Gradient": "scene",
     "Phong": "scene",
+    "Plane": "scene",
     "PointLight": "scene",
     "Scene": "scene",
     "Sphere": "scene",
@@ -41,6 +54,7 @@ _HOME = {
     "translate": "pipeline",
     "evaluate": "run.render",
     "render_image": "run.render",
+    "render_layers": "run.render",
     "AccuracyError": "errors",
     "ArgumentError": "errors",
     "CompileError": "errors",
@@ -58,9 +72,12 @@ __all__ = [
     "Camera",
     "CompileError",
     "CompilerNotFoundError",
+    "DirectionalLight",
+    "Gradient",
     "LibraryError",
     "OutsidePlanError",
     "Phong",
+    "Plane",
     "PointLight",
     "Scene",
     "SceneError",
@@ -72,6 +89,7 @@ __all__ = [
     "evaluate",
     "load_scene",
     "render_image",
+    "render_layers",
     "statistics",
     "translate",
 ]

@@ -2,14 +2,17 @@
 
     stage    in -> out                            owner
     plan     Scene -> Plan                        symrender_cg.plan
-    derive   Plan -> ImageProgram                 symrender_cg.derive
-    lower    ImageProgram -> KernelProgram        symrender_cg.lower
-    emit     KernelProgram -> C text              symrender_cg.emit
+    derive   Plan -> ImageProgram, or Parts       symrender_cg.derive
+    lower    each of them -> KernelProgram        symrender_cg.lower
+    emit     KernelPrograms -> C text             symrender_cg.emit
     build    C text -> library                    symrender_cg.build
     run      library + numbers -> image           symrender_cg.run
 
+What is one sphere under one light is one ImageProgram; every other scene is drawn by loops over the Parts of one.
+
 A kernel is remembered twice: in this process, and in the cache on disk under its recipe (plan, accuracy, version of the
-compiler), so that neither sympy nor a C compiler is touched when only numbers change.
+compiler), so that neither sympy nor a C compiler is touched when only numbers change. When numbers change so that the
+plan does, the scene gets another kernel, and a line at debug level says so.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import math
 import threading
 import time
 from collections.abc import Iterable
@@ -30,15 +34,19 @@ import numpy as np
 
 from symrender_cg.build.cache import Cache, default_root
 from symrender_cg.build.library import CachedKernel
+from symrender_cg.errors import ArgumentError, OutsidePlanError
 from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.plan.plan import Plan, plan, require_format
 from symrender_cg.resources import templates
+from symrender_cg.run.drawing import Drawing, bind
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.numbers import numbers_of
+from symrender_cg.run.scene_kernel import SceneKernel
 from symrender_cg.scene import Scene
 from symrender_cg.version import VERSION
 
 if TYPE_CHECKING:
+    from symrender_cg.derive.parts import Part
     from symrender_cg.derive.program import ImageProgram
     from symrender_cg.emit.c99 import Emitted
     from symrender_cg.lower.lower import Stage
@@ -49,8 +57,11 @@ log = logging.getLogger("symrender_cg")
 
 @dataclass
 class Statistics:
-    """What this process did so far: kernels derived, compiled, recalled from the cache on disk, reused in memory."""
+    """What this process did so far: kernels derived, compiled, recalled from the cache on disk, reused in memory, and
+    how often a scene was planned and its plan was another one than that of the scene before it."""
 
+    planned: int = 0
+    replanned: int = 0
     derived: int = 0
     compiled: int = 0
     recalled: int = 0
@@ -67,19 +78,33 @@ statistics = Statistics()
 
 
 @dataclass(frozen=True)
-class Translation:
-    """A scene's C text and how it came about: the plan, the programs, every pass, and the seconds of each stage."""
+class SphereTranslation:
+    """The C text of the kernel of one sphere and how it came about: the programs, every pass, seconds of each stage."""
 
     plan: Plan
     variant: Variant
+    emitted: Emitted
+    seconds: dict[str, float]
     image: ImageProgram
     program: KernelProgram
     passes: tuple[Stage, ...]
+
+
+@dataclass(frozen=True)
+class SceneTranslation:
+    """The C text of the kernel of a scene and how it came about: its parts, derived and lowered."""
+
+    plan: Plan
+    variant: Variant
     emitted: Emitted
     seconds: dict[str, float]
+    parts: dict[str, Part]
+    programs: dict[str, KernelProgram]
 
 
-_kernels: dict[tuple[Any, ...], Kernel] = {}
+Translation = SphereTranslation | SceneTranslation
+
+_kernels: dict[tuple[Any, ...], Kernel | SceneKernel] = {}
 _locks: dict[tuple[Any, ...], threading.Lock] = {}
 _guard = threading.Lock()
 
@@ -92,23 +117,62 @@ def compile_kernel(
     portable: bool = False,
     force: Iterable[str] = (),
     cache: str | Path | None = None,
-) -> Kernel:
-    """The kernel for a scene: from memory, from the cache on disk, or derived, emitted and compiled now."""
-    chosen = variant(accuracy)
-    scene_plan = _planned(scene, tuple(force))
-    require_format(scene, scene_plan, chosen.shading)
-    root = Path(cache) if cache is not None else default_root()
-    baked = tuple(sorted(numbers_of(scene).items())) if bake else ()
-    key = (scene_plan.key, chosen.name, baked, portable, root)
-    kernel = _kernels.get(key)
-    if kernel is not None:
-        statistics.add("reused")
-        return kernel
-    with _lock_of(key):
-        kernel = _kernels.get(key)
-        if kernel is None:
-            kernel = _kernels[key] = _kernel(scene, scene_plan, chosen, bake=bake, portable=portable, root=root)
-    return kernel
+) -> Kernel | SceneKernel:
+    """The kernel for a scene, at any point of the image plane: from memory, from the cache on disk, or compiled now."""
+    found = planned(scene, force=tuple(force))
+    return _compiled(found, accuracy, bake=bake, portable=portable, cache=cache)
+
+
+def draw(
+    scene: Scene,
+    accuracy: str = "double",
+    *,
+    size: tuple[int, int] | None = None,
+    clip: bool = False,
+    bake: bool = False,
+    portable: bool = False,
+    force: Iterable[str] = (),
+    max_error: float = 0.0,
+    cache: str | Path | None = None,
+) -> Drawing:
+    """A scene bound to its kernel: for an image of `size` (width, height) pixels, or for points where it is None."""
+    aspect = None if size is None else size[0] / size[1]
+    found = planned(scene, force=tuple(force), aspect=aspect, max_error=max_error)
+    kernel = _compiled(found, accuracy, bake=bake, portable=portable, cache=cache)
+    white = 1.0 if clip else math.inf
+    if size is None:
+        return bind(kernel, found, white=white)
+    return bind(kernel, found, width=size[0], height=size[1], pixel=pixel_size(found.scene, size[1]), white=white)
+
+
+def pixel_size(frame: Scene, height: int) -> float:
+    """The side of a pixel of an image with that many rows, in scene units; `frame` is a camera-frame scene."""
+    half_height = frame.camera.half_height
+    assert half_height is not None, "a camera-frame scene has its half_height"
+    return 2.0 * half_height / height
+
+
+def planned(
+    scene: Scene, *, force: tuple[str, ...] = (), aspect: float | None = None, max_error: float = 0.0
+) -> Plan:
+    """The plan of a scene, remembered: a scene is drawn more than once."""
+    found = _planned(scene, force, aspect, max_error)
+    with _guard:
+        before, _last[0] = _last[0], found
+    if before is not None and before.key != found.key:
+        statistics.add("replanned")
+        gone, new = sorted(set(before.key) - set(found.key)), sorted(set(found.key) - set(before.key))
+        log.debug("replanned: %s after %s; in: %s; out: %s", found.name, before.name, new or "-", gone or "-")
+    return found
+
+
+_last: list[Plan | None] = [None]
+
+
+@lru_cache(maxsize=256)
+def _planned(scene: Scene, force: tuple[str, ...], aspect: float | None, max_error: float) -> Plan:
+    statistics.add("planned")
+    return plan(scene, force=force, aspect=aspect, max_error=max_error)
 
 
 def translate(
@@ -117,45 +181,102 @@ def translate(
     *,
     bake: bool = False,
     force: Iterable[str] = (),
+    aspect: float | None = None,
+    max_error: float = 0.0,
     name: str | None = None,
     command: str | None = None,
 ) -> Translation:
     """Plan, derive, lower and emit: the C text of a scene's kernel, without compiling it."""
+    start = time.perf_counter()
+    found = plan(scene, force=force, aspect=aspect, max_error=max_error)
+    seconds = {"plan": time.perf_counter() - start}
+    return _translated(found, variant(accuracy), seconds, bake=bake, name=name, command=command)
+
+
+def _translated(
+    found: Plan,
+    chosen: Variant,
+    seconds: dict[str, float],
+    *,
+    bake: bool = False,
+    name: str | None = None,
+    command: str | None = None,
+) -> Translation:
+    require_kind(found, chosen, bake=bake)
+    told = command or f"python -m symrender_cg build SCENE --accuracy {chosen.name}"
+    statistics.add("derived")
+    if found.arrangement is None:
+        return _translated_sphere(found, chosen, seconds, bake=bake, name=name, command=told)
+    return _translated_scene(found, chosen, seconds, name=name, command=told)
+
+
+def require_kind(found: Plan, chosen: Variant, *, bake: bool) -> None:
+    """Raises where there is no such kernel of scenes: baked, or by the formula of the seed, which has one sphere."""
+    if found.arrangement is None:
+        return
+    if bake:
+        raise ArgumentError(
+            "bake: the kernel of a scene loops over arrays of spheres and lights, so there are no numbers to fold in; "
+            "baked kernels are of one sphere and one light; leave bake out"
+        )
+    if not chosen.exact:
+        raise OutsidePlanError(
+            f"accuracy: {chosen.name!r} is the formula of one sphere under one light; this scene has more; "
+            "use 'double' or 'single'"
+        )
+
+
+def _translated_sphere(
+    found: Plan, chosen: Variant, seconds: dict[str, float], *, bake: bool, name: str | None, command: str
+) -> SphereTranslation:
     from symrender_cg.derive.exact import sign_tests
     from symrender_cg.derive.image import derive
     from symrender_cg.emit.c99 import emit
     from symrender_cg.lower.lower import lower
 
-    chosen = variant(accuracy)
-    seconds: dict[str, float] = {}
-
-    def timed(stage: str, start: float) -> None:
-        seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start
-
     start = time.perf_counter()
-    scene_plan = plan(scene, force=force)
-    timed("plan", start)
-    start = time.perf_counter()
-    image = derive(scene_plan)
+    image = derive(found)
     tests = sign_tests(image)
-    timed("derive", start)
-    start = time.perf_counter()
-    numbers = numbers_of(scene) if bake else None
-    program, passes = lower(image, scene_plan, chosen, numbers=numbers)
-    timed("lower", start)
-    start = time.perf_counter()
+    derived = time.perf_counter()
+    numbers = numbers_of(found.scene) if bake else None
+    program, passes = lower(image, found, chosen, numbers=numbers)
+    lowered = time.perf_counter()
     emitted = emit(
         program,
-        plan=scene_plan,
+        plan=found,
         variant=chosen,
         sign_tests=tests,
-        command=command or f"python -m symrender_cg build SCENE --accuracy {chosen.name}",
+        command=command,
         numbers=numbers,
         name=name or (f"{program.name}_baked" if bake else None),
     )
-    timed("emit", start)
-    statistics.add("derived")
-    return Translation(scene_plan, chosen, image, program, passes, emitted, seconds)
+    seconds |= {"derive": derived - start, "lower": lowered - derived, "emit": time.perf_counter() - lowered}
+    return SphereTranslation(found, chosen, emitted, seconds, image, program, passes)
+
+
+def _translated_scene(
+    found: Plan, chosen: Variant, seconds: dict[str, float], *, name: str | None, command: str
+) -> SceneTranslation:
+    from symrender_cg.emit.scene import emit_scene, scene_parts
+    from symrender_cg.emit.scene_fields import Needs
+    from symrender_cg.lower.parts import lower_part
+
+    start = time.perf_counter()
+    need = Needs.of(found.flags)
+    parts = scene_parts(need)
+    derived = time.perf_counter()
+    programs = {key: lower_part(part, chosen) for key, part in parts.items()}
+    lowered = time.perf_counter()
+    emitted = emit_scene(
+        programs,
+        need=need,
+        plan=found,
+        variant=chosen,
+        command=command,
+        name=name or f"{found.name}_{chosen.name}",
+    )
+    seconds |= {"derive": derived - start, "lower": lowered - derived, "emit": time.perf_counter() - lowered}
+    return SceneTranslation(found, chosen, emitted, seconds, parts, programs)
 
 
 def build_kernel(
@@ -179,9 +300,30 @@ def recipe_of(scene_plan: Plan, accuracy: str, baked: Iterable[tuple[str, float]
     return json.dumps([VERSION, _source_digest(), scene_plan.key, reasons, accuracy, exact, portable])
 
 
-def _kernel(scene: Scene, scene_plan: Plan, chosen: Variant, *, bake: bool, portable: bool, root: Path) -> Kernel:
-    baked = tuple(sorted(numbers_of(scene).items())) if bake else ()
-    recipe = recipe_of(scene_plan, chosen.name, baked, portable)
+def _compiled(
+    found: Plan, accuracy: str, *, bake: bool, portable: bool, cache: str | Path | None
+) -> Kernel | SceneKernel:
+    chosen = variant(accuracy)
+    require_kind(found, chosen, bake=bake)
+    require_format(found.scene, found, chosen.shading)
+    root = Path(cache) if cache is not None else default_root()
+    baked = tuple(sorted(numbers_of(found.scene).items())) if bake else ()
+    key = (found.key, chosen.name, baked, portable, root)
+    kernel = _kernels.get(key)
+    if kernel is not None:
+        statistics.add("reused")
+        return kernel
+    with _lock_of(key):
+        kernel = _kernels.get(key)
+        if kernel is None:
+            kernel = _kernels[key] = _kernel(found, chosen, baked, portable=portable, root=root)
+    return kernel
+
+
+def _kernel(
+    found: Plan, chosen: Variant, baked: tuple[tuple[str, float], ...], *, portable: bool, root: Path
+) -> Kernel | SceneKernel:
+    recipe = recipe_of(found, chosen.name, baked, portable)
     store = Cache(root)
     recalled = store.recall(recipe, portable=portable)
     if recalled is not None:
@@ -189,36 +331,38 @@ def _kernel(scene: Scene, scene_plan: Plan, chosen: Variant, *, bake: bool, port
         statistics.add("recalled")
         log.debug("kernel %s recalled from %s", payload["name"], cached.folder)
     else:
-        forced = [d.effect.name for d in scene_plan.decisions if d.needed]
-        translation = translate(scene, chosen.name, bake=bake, force=forced)
+        translation = _translated(found, chosen, {}, bake=bool(baked))
         cached = build_kernel(translation, portable=portable, root=root, recipe=recipe)
         payload = _payload(translation)
         log.debug("kernel %s compiled: %s", payload["name"], " ".join(cached.manifest.command))
+    dtype = np.dtype(np.float32 if payload["type"] == "float" else np.float64)
+    library = store.load(cached)
+    if "fields" in payload:
+        fields = tuple((str(name), str(shape)) for name, shape in payload["fields"])
+        return SceneKernel(payload["name"], fields, int(payload["channels"]), dtype, cached, library)
     return Kernel(
         name=payload["name"],
         inputs=tuple(payload["inputs"]),
-        dtype=np.dtype(np.float32 if payload["type"] == "float" else np.float64),
+        dtype=dtype,
         cached=cached,
-        library=store.load(cached),
+        library=library,
         baked=payload["baked"],
     )
 
 
 def _payload(translation: Translation) -> dict[str, Any]:
     emitted = translation.emitted
-    return {
+    payload: dict[str, Any] = {
         "name": emitted.name,
         "inputs": list(emitted.inputs),
         "type": emitted.result_type,
         "baked": not emitted.inputs,
         "operations": emitted.operations,
     }
-
-
-@lru_cache(maxsize=256)
-def _planned(scene: Scene, force: tuple[str, ...]) -> Plan:
-    """The plan of a scene, remembered: a scene is drawn more than once."""
-    return plan(scene, force=force)
+    if isinstance(translation, SceneTranslation):
+        payload["fields"] = [list(field) for field in emitted.fields]
+        payload["channels"] = 3 if "colour" in translation.plan.flags else 1
+    return payload
 
 
 def _lock_of(key: tuple[Any, ...]) -> threading.Lock:

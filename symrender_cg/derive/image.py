@@ -18,13 +18,24 @@ LAGRANGE = "Lagrange's identity |m|^2 |D|^2 - (m.D)^2 = |m x D|^2"
 
 def derive(plan: Plan) -> ImageProgram:
     """The definitions of the planned image, in the order of the mathematics."""
-    definitions = [*_ray_and_sphere(), *_hit_point()]
-    if plan.needs("diffuse") or plan.needs("specular"):
-        definitions += _light()
-    definitions += _shading(plan)
-    guard = ("disc", "m_dot_d") if plan.needs("front_test") else ("disc",)
-    program = ImageProgram(name=plan.name, definitions=(), guard=guard).replacing(tuple(definitions))
+    program = derive_sphere(
+        plan.name,
+        front_test=plan.needs("front_test"),
+        diffuse=plan.needs("diffuse"),
+        specular=plan.needs("specular"),
+        gated=plan.needs("specular_gate"),
+    )
     return program if plan.needs("off_axis") else centred(program)
+
+
+def derive_sphere(name: str, *, front_test: bool, diffuse: bool, specular: bool, gated: bool) -> ImageProgram:
+    """The definitions of the image of one sphere anywhere under one point light, with the terms asked for."""
+    definitions = [*_ray_and_sphere(), *_hit_point()]
+    if diffuse or specular:
+        definitions += _light()
+    definitions += _shading(diffuse=diffuse, specular=specular, gated=gated)
+    guard = ("disc", "m_dot_d") if front_test else ("disc",)
+    return ImageProgram(name=name, definitions=(), guard=guard).replacing(tuple(definitions))
 
 
 def centred(program: ImageProgram) -> ImageProgram:
@@ -121,19 +132,19 @@ def _light() -> list[Definition]:
     ]
 
 
-def _shading(plan: Plan) -> list[Definition]:
+def _shading(*, diffuse: bool, specular: bool, gated: bool) -> list[Definition]:
     n_dot_l = symbol("n_dot_l")
     definitions: list[Definition] = []
     total: sp.Expr = symbol("k_ambient")
     terms: list[sp.Expr] = []
-    if plan.needs("diffuse"):
+    if diffuse:
         section = "diffuse"
         definitions.append(
             Definition("diffuse", symbol("k_diffuse") * sp.Max(0, n_dot_l), section, "k_d max(0, n.l)", PHONG)
         )
         terms.append(symbol("diffuse"))
-    if plan.needs("specular"):
-        definitions += _specular(gated=plan.needs("specular_gate"))
+    if specular:
+        definitions += _specular(gated=gated)
         terms.append(symbol("specular"))
     if terms:
         lit = symbol("light_intensity") * sp.Add(*terms)

@@ -18,6 +18,7 @@ from symrender_cg.lower.nodes import Call
 from symrender_cg.lower.program import KernelProgram, Step, operations_of
 
 WIDTH = 120
+INDENT = "    "
 
 
 def operations(steps: Iterable[Step]) -> Counter[str]:
@@ -49,13 +50,13 @@ class Bodies:
         self.row_fields = [(self._type(s), s.name) for s in row if s.name in of_row]
         if "y" in of_row:
             self.row_fields.insert(0, ("double", "y"))
-        self.frame = self._body(program.at("frame"), dict.fromkeys(program.inputs, "scene->"))
+        self.frame = body(program.at("frame"), dict.fromkeys(program.inputs, "scene->"))
         carried = "" if baked else "f->"
         frame_places = dict.fromkeys((*program.inputs, *(s.name for s in program.at("frame"))), carried)
-        self.row = self._body(row, frame_places)
+        self.row = body(row, frame_places)
         self.pixel_places = frame_places | {s.name: "r->" for s in row} | {"y": "r->"}
-        self.pixel = self._body(pixel, self.pixel_places)
-        self.sight = self._body(self._closure(("d_dot_d", *program.hit)), self.pixel_places)
+        self.pixel = body(pixel, self.pixel_places)
+        self.sight = body(closure(pixel, ("d_dot_d", *program.hit)), self.pixel_places)
         self.constants = self._constants(program.at("frame")) if baked else []
 
     def word(self, name: str) -> str:
@@ -87,11 +88,11 @@ class Bodies:
 
     def frame_declarations(self) -> list[str]:
         """Fields of the frame structure, those of one type together."""
-        return _declared((kind, name.removeprefix("scene_")) for kind, name in self.frame_fields)
+        return declared((kind, name.removeprefix("scene_")) for kind, name in self.frame_fields)
 
     def row_declarations(self) -> list[str]:
         """Fields of the row structure."""
-        return _declared(self.row_fields)
+        return declared(self.row_fields)
 
     def _type(self, step: Step) -> str:
         return str(C_TYPES[step.format].name)
@@ -99,53 +100,6 @@ class Bodies:
     def _fields(self, steps: Sequence[Step], later: set[str], inputs: Sequence[str]) -> list[tuple[str, str]]:
         fields = [(self._type(step), step.name) for step in steps if step.name in later]
         return fields + [("double", name) for name in inputs if name in later and name != self.program.background]
-
-    def _closure(self, names: Iterable[str]) -> tuple[Step, ...]:
-        needed = set(names)
-        kept: list[Step] = []
-        for step in reversed(self.program.at("pixel")):
-            if step.name in needed:
-                kept.append(step)
-                needed |= step.uses()
-        return tuple(reversed(kept))
-
-    def _body(self, steps: Sequence[Step], places: Mapping[str, str]) -> list[str]:
-        """Lines of declarations, a comment before each section."""
-        lines: list[str] = []
-        section: str | None = None
-        group: list[Step] = []
-        for step in (*steps, None):
-            if step is None or step.section != section:
-                if group:
-                    lines += ["", *self._section(group, places)] if lines else self._section(group, places)
-                group = []
-                section = step.section if step else None
-            if step is not None:
-                group.append(step)
-        return lines
-
-    def _section(self, steps: Sequence[Step], places: Mapping[str, str]) -> list[str]:
-        """A comment with the section's sources and operations, then its statements, each with its formula in words."""
-        sources = dict.fromkeys(step.source for step in steps if step.source)
-        operations = counts(steps)
-        text = steps[0].section + (f" [{operations}]" if operations != "none" else "")
-        text += "".join(f". {source}" for source in sources)
-        comment = Comment("\n     * ".join(textwrap.wrap(text, WIDTH - 12, break_long_words=False)))
-        lines = ("    " + str(KernelPrinter(places, False)._print(comment))).split("\n")
-        return lines + [line for step in steps for line in self._statement(step, places)]
-
-    def _statement(self, step: Step, places: Mapping[str, str]) -> list[str]:
-        printer = KernelPrinter(places, step.format == "float32")
-        variable = Variable(symbol(step.name), type=C_TYPES[step.format], attrs={value_const})
-        text = printer._print(Declaration(variable.as_Declaration(value=step.value).variable)) + ";"
-        lines = wrap(text, "    ")
-        if not step.meaning:
-            return lines
-        if len(lines) == 1 and len(lines[0]) + len(step.meaning) + 9 <= WIDTH:
-            return [f"{lines[0]}   /* {step.meaning} */"]
-        first, *rest = textwrap.wrap(step.meaning, WIDTH - 12, break_long_words=False)
-        comment = [f"    /* {first}", *(f"     * {line}" for line in rest)]
-        return [*comment[:-1], comment[-1] + " */", *lines]
 
     def _constants(self, steps: Sequence[Step]) -> list[str]:
         lines = []
@@ -168,7 +122,62 @@ class Bodies:
         return lines
 
 
-def _declared(fields: Iterable[tuple[str, str]]) -> list[str]:
+def body(steps: Sequence[Step], places: Mapping[str, str], indent: str = INDENT) -> list[str]:
+    """Lines of declarations, a comment before each section; `places` as for KernelPrinter."""
+    lines: list[str] = []
+    section: str | None = None
+    group: list[Step] = []
+    for step in (*steps, None):
+        if step is None or step.section != section:
+            if group:
+                lines += ["", *_section(group, places, indent)] if lines else _section(group, places, indent)
+            group = []
+            section = step.section if step else None
+        if step is not None:
+            group.append(step)
+    return lines
+
+
+def closure(steps: Sequence[Step], names: Iterable[str]) -> tuple[Step, ...]:
+    """Those of the steps that lead to the named ones, in their order."""
+    needed = set(names)
+    kept: list[Step] = []
+    for step in reversed(steps):
+        if step.name in needed:
+            kept.append(step)
+            needed |= step.uses()
+    return tuple(reversed(kept))
+
+
+def _section(steps: Sequence[Step], places: Mapping[str, str], indent: str) -> list[str]:
+    """A comment with the section's sources and operations, then its statements, each with its formula in words."""
+    sources = dict.fromkeys(step.source for step in steps if step.source)
+    operations = counts(steps)
+    text = steps[0].section + (f" [{operations}]" if operations != "none" else "")
+    text += "".join(f". {source}" for source in sources)
+    width = WIDTH - 8 - len(indent)
+    comment = Comment(f"\n{indent} * ".join(textwrap.wrap(text, width, break_long_words=False)))
+    lines = (indent + str(KernelPrinter(places, False)._print(comment))).split("\n")
+    return lines + [line for step in steps for line in statement(step, places, indent)]
+
+
+def statement(step: Step, places: Mapping[str, str], indent: str = INDENT) -> list[str]:
+    """The declaration of one step, with its formula in words beside or above it."""
+    printer = KernelPrinter(places, step.format == "float32")
+    variable = Variable(symbol(step.name), type=C_TYPES[step.format], attrs={value_const})
+    text = printer._print(Declaration(variable.as_Declaration(value=step.value).variable)) + ";"
+    lines = wrap(text, indent)
+    if not step.meaning:
+        return lines
+    if len(lines) == 1 and len(lines[0]) + len(step.meaning) + 9 <= WIDTH:
+        return [f"{lines[0]}   /* {step.meaning} */"]
+    first, *rest = textwrap.wrap(step.meaning, WIDTH - 8 - len(indent), break_long_words=False)
+    comment = [f"{indent}/* {first}", *(f"{indent} * {line}" for line in rest)]
+    return [*comment[:-1], comment[-1] + " */", *lines]
+
+
+def declared(fields: Iterable[tuple[str, str]]) -> list[str]:
+    """Fields of a structure, those of one type together."""
     groups: dict[str, list[str]] = {}
     for kind, name in fields:
         groups.setdefault(kind, []).append(name)
@@ -180,9 +189,9 @@ def _declared(fields: Iterable[tuple[str, str]]) -> list[str]:
     return lines
 
 
-def wrap(statement: str, indent: str) -> list[str]:
+def wrap(text: str, indent: str, continuation: str | None = None) -> list[str]:
     """A C statement in lines of at most 120 characters, broken before an operator at the outermost level it can be."""
-    line = indent + statement
+    line = indent + text
     if len(line) <= WIDTH:
         return [line]
     breaks: list[tuple[int, int]] = []
@@ -195,12 +204,10 @@ def wrap(statement: str, indent: str) -> list[str]:
             depth -= 1
         elif match.start() < WIDTH:
             breaks.append((depth, match.start()))
-    assert breaks, f"no place to break {statement!r}"
+    assert breaks, f"no place to break {text!r}"
     shallowest = min(depth for depth, _ in breaks)
     at = max(place for depth, place in breaks if depth == shallowest)
     if at < WIDTH // 3:
         at = max(place for _, place in breaks)
-    return [
-        line[:at].rstrip(),
-        *wrap(line[at:], " " * (len(indent.rstrip("\n")) + 4 if len(indent) == 4 else len(indent))),
-    ]
+    hanging = continuation or indent + INDENT
+    return [line[:at].rstrip(), *wrap(line[at:], hanging, hanging)]

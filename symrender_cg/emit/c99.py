@@ -6,7 +6,7 @@ points, comments) is in templates/kernel.c.j2 and kernel.h.j2, which contain no 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -35,7 +35,10 @@ SUPPORT = {
 
 @dataclass(frozen=True, slots=True)
 class Emitted:
-    """The text of a kernel. `files` maps file names to text (the kernel's own two first); `cdef` is what cffi reads."""
+    """The text of a kernel. `files` maps file names to text (the kernel's own two first); `cdef` is what cffi reads.
+
+    `fields` are names and shapes of a scene kernel's structure, see symrender_cg.emit.scene_fields.
+    """
 
     name: str
     files: Mapping[str, str]
@@ -43,6 +46,7 @@ class Emitted:
     inputs: tuple[str, ...]
     result_type: str
     operations: dict[str, dict[str, int]]
+    fields: tuple[tuple[str, str], ...] = ()
 
 
 def emit(
@@ -57,6 +61,12 @@ def emit(
 ) -> Emitted:
     """C99 text of a lowered kernel. `command` is the line that regenerates it; `numbers` are those baked in."""
     kernel = name or program.name
+
+    def place(factor: str) -> str:
+        if factor in ("x", "y"):
+            return factor
+        return repr(float(numbers[factor])) if numbers is not None else f"scene->{factor}"
+
     writer = Bodies(program, baked=numbers is not None)
     uses = {node.function for step in program.steps for node in walk(step.value) if isinstance(node, Call)}
     double_double = any(step.format == "double_double" for step in program.steps)
@@ -86,28 +96,29 @@ def emit(
         "scaled": "plane_unit" in program,
         "counts": {rate: counts(program.at(rate)) for rate in RATES},
         "fields": [(row.name, row.meaning) for row in INPUTS if f"scene_{row.name}" in program.inputs],
-        "sign_tests": [_printed(test, numbers) for test in sign_tests],
+        "sign_tests": [printed_test(test, place) for test in sign_tests],
         "result": program.result,
         "tests_front": len(program.hit) > 1,
         "writer": writer,
     }
-    source = _environment().get_template("kernel.c.j2").render(context)
-    header = _environment().get_template("kernel.h.j2").render(context)
+    source = environment().get_template("kernel.c.j2").render(context)
+    header = environment().get_template("kernel.h.j2").render(context)
     files = {f"{kernel}.c": source, f"{kernel}.h": header}
     carried = ("grid.h", *includes, *(("power.h",) if "phong_power.h" in includes else ()))
     files |= {h: template_path(f"support/{h}").read_text(encoding="utf-8") for h in carried}
     return Emitted(
         name=kernel,
         files=files,
-        cdef=_environment().get_template("kernel.cdef.j2").render(context),
+        cdef=environment().get_template("kernel.cdef.j2").render(context),
         inputs=tuple(entry.removeprefix("scene_") for entry in program.inputs),
         result_type=str(context["real"]),
-        operations={rate: dict(operations(program.at(rate))) for rate in RATES},
+        operations={rate: dict(operations(program.at(rate))) for rate in RATES if rate != "sphere"},
     )
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """The templates, as jinja2 reads them."""
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(templates()),
         undefined=jinja2.StrictUndefined,
@@ -118,14 +129,8 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def _printed(test: SignTest, numbers: Mapping[str, float] | None) -> dict[str, object]:
-    """A sign test with its factors as C expressions, padded with 1 to four."""
-
-    def place(factor: str) -> str:
-        if factor in ("x", "y"):
-            return factor
-        return repr(float(numbers[factor])) if numbers is not None else f"scene->{factor}"
-
+def printed_test(test: SignTest, place: Callable[[str], str]) -> dict[str, object]:
+    """A sign test with its factors as C expressions, padded with 1 to four; `place` says where a factor lives."""
     products = []
     for monomial in test.monomials:
         factors = [place(factor) for factor in monomial.factors]

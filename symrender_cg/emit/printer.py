@@ -80,7 +80,8 @@ def _same_single(text: str, value: float) -> bool:
 
 
 class KernelPrinter(C99CodePrinter):  # type: ignore[misc]
-    """Prints frozen steps; `places` says for each name what stands before it, such as `f->`."""
+    """Prints frozen steps; `places` says where each name lives: `f->` before it, `p->{}[i]`
+    around it, or `=p->n_x[i]` in its place."""
 
     def __init__(self, places: Mapping[str, str], single: bool) -> None:
         super().__init__()
@@ -89,7 +90,10 @@ class KernelPrinter(C99CodePrinter):  # type: ignore[misc]
 
     def _print_Symbol(self, symbol: sp.Symbol) -> str:
         name: str = symbol.name
-        return self._places.get(name, "") + name.removeprefix("scene_")
+        place, bare = self._places.get(name, ""), name.removeprefix("scene_")
+        if place.startswith("="):
+            return place[1:]
+        return place.replace("{}", bare) if "{}" in place else place + bare
 
     def _operand(self, node: sp.Basic, level: int) -> str:
         text: str = self._print(node)
@@ -126,7 +130,7 @@ class KernelPrinter(C99CodePrinter):  # type: ignore[misc]
 
     def _print_Select(self, node: Select) -> str:
         condition, first, second = node.args
-        return f"{self._print(condition)} ? {self._operand(first, _PLUS)} : {self._operand(second, _PLUS)}"
+        return f"{self._operand(condition, _COMPARE)} ? {self._operand(first, _PLUS)} : {self._operand(second, _PLUS)}"
 
     def _print_Positive(self, node: Positive) -> str:
         return f"{self._operand(node.args[0], _PLUS)} > {self._zero()}"

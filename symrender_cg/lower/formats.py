@@ -30,7 +30,7 @@ from symrender_cg.lower.nodes import (
     call,
     number,
 )
-from symrender_cg.lower.program import Format, KernelProgram, Step
+from symrender_cg.lower.program import RATES, Format, KernelProgram, Rate, Step
 
 
 def convert_formats(program: KernelProgram) -> KernelProgram:
@@ -42,12 +42,13 @@ def convert_formats(program: KernelProgram) -> KernelProgram:
     int:      ldexp arguments stay as they are
     """
     formats: dict[str, Format] = {step.name: step.format for step in program.steps}
-    rates = {step.name: step.rate for step in program.steps} | {"x": "pixel", "y": "row"}
+    of_inputs: dict[str, Rate] = {name: RATES[rate] for name, rate in program.input_rates().items()}
+    rates = of_inputs | {step.name: step.rate for step in program.steps}
     steps: list[Step] = []
     rounded: set[str] = set()
 
     def wide(name: str) -> Format:
-        return formats.get(name, "float64")
+        return formats.get(name, "float32" if name in program.narrow else "float64")
 
     for step in program.steps:
         if step.format == "float32":

@@ -34,9 +34,9 @@ from symrender_cg.lower.program import KernelProgram, Step
 from symrender_cg.lower.variants import Variant
 from symrender_cg.plan.plan import Plan
 
-_FUNCTIONS = {
-    "float64": {"power": "power", "cosine": "power_of_cosine"},
-    "float32": {"power": "powerf", "cosine": "power_of_cosinef"},
+FUNCTIONS = {
+    "float64": {"power": "power", "cosine": "power_of_cosine", "floor": "floor"},
+    "float32": {"power": "powerf", "cosine": "power_of_cosinef", "floor": "floorf"},
 }
 
 
@@ -68,7 +68,7 @@ def lower(
         ("scale lengths", passes.scale_lengths if variant.exact else _raw_inputs),
         ("regularise", passes.regularise),
         *((("whole exponent", baked_exponent),) if exponent is not None else ()),
-        ("lower powers", lambda program: passes.lower_powers(program, _FUNCTIONS[variant.shading])),
+        ("lower powers", lambda program: passes.lower_powers(program, FUNCTIONS[variant.shading])),
         ("place", passes.place),
         ("hoist", passes.hoist),
         ("share", passes.share),

@@ -16,9 +16,13 @@ from symrender_cg.lower.program import RATES, Format, KernelProgram, Rate, Step
 from symrender_cg.lower.variants import Variant
 
 
-def assign_formats(program: KernelProgram, variant: Variant) -> KernelProgram:
-    """Each step gets the number format that the variant states for its quantity. Exact: formats round later."""
-    wide = variant.double_double | (frozenset() if program.ends else variant.per_pixel_exact)
+def assign_formats(program: KernelProgram, variant: Variant, *, exact: bool = True) -> KernelProgram:
+    """Each step gets the number format that the variant states for its quantity. Exact: formats round later.
+
+    `exact` is False for a part of a kernel that decides no hit of the eye's ray.
+    """
+    per_pixel = frozenset() if program.ends else variant.per_pixel_exact
+    wide: frozenset[str] = variant.double_double | per_pixel if exact else frozenset()
     shading: Format = "float32" if variant.shading == "float32" else "float64"
 
     def chosen(name: str) -> Format:
@@ -50,31 +54,36 @@ def regularise(program: KernelProgram) -> KernelProgram:
     return program.map(change)
 
 
-def scale_lengths(program: KernelProgram) -> KernelProgram:
+def scale_lengths(program: KernelProgram, *, farthest: int | None = None) -> KernelProgram:
     """Lengths of the image plane in units of 2^k so that f is in [1, 2), lengths of the scene so that R is: exact,
     and no square can overflow. A light farther than 2^60 (float32: 2^30) radii is brought to that distance, which
     turns its direction by less than 2^-60.
 
         focal = eye                  ->  plane_exponent = -exponent(scene_eye); focal = scene_eye 2^plane_exponent
         lamp_x = from_center_x / R   ->  lamp_x = (from_center_x 2^light_exponent) / R
+
+    A part of a program may lack the eye or the radius; `farthest` is given where its result does not tell the format.
     """
     scaled = [name for name in ("eye", "radius", "center_x", "center_y", "center_z") if name in program.inputs]
     raw = {symbol(name): symbol(f"scene_{name}") for name in program.inputs}
     section = "units of length, powers of two"
     eye, radius = symbol("scene_eye"), symbol("scene_radius")
     plane, world, lamp = symbol("plane_exponent"), symbol("world_exponent"), symbol("lamp_exponent")
-    head = [
-        Step("plane_exponent", call("unit_exponent", eye), section, "f = e 2^k in [1, 2)", format="int"),
-        Step("plane_unit", call("ldexp", sp.Integer(1), plane), section, format="float64"),
-        Step("world_exponent", call("unit_exponent", radius), section, "R 2^k in [1, 2)", format="int"),
-    ]
-    head += [Step(name, call("ldexp", raw[symbol(name)], world), section) for name in scaled]
-    farthest = sp.Integer(30 if program[program.result].format == "float32" else 60)
+    head: list[Step] = []
+    if "eye" in program.inputs:
+        head += [
+            Step("plane_exponent", call("unit_exponent", eye), section, "f = e 2^k in [1, 2)", format="int"),
+            Step("plane_unit", call("ldexp", sp.Integer(1), plane), section, format="float64"),
+        ]
+    if "radius" in program.inputs:
+        head.append(Step("world_exponent", call("unit_exponent", radius), section, "R 2^k in [1, 2)", format="int"))
+    head += [Step(name, call("ldexp", raw[symbol(name)], world), section) for name in scaled if "radius" in scaled]
+    limit = sp.Integer(farthest or (30 if program[program.result].format == "float32" else 60))
     offsets = [step for step in program.steps if step.name.startswith("from_center_")]
     if offsets:
         head += [replace(step, value=step.value.xreplace(raw), format="float64") for step in offsets]
-        exponent = call("light_exponent", world, radius, *(step.symbol for step in offsets), farthest)
-        meaning = f"farther than 2^{farthest} R a light shines in parallel"
+        exponent = call("light_exponent", world, radius, *(step.symbol for step in offsets), limit)
+        meaning = f"farther than 2^{limit} R a light shines in parallel"
         head.append(Step("lamp_exponent", exponent, offsets[0].section, meaning, format="int"))
     body: list[Step] = []
     for step in program.steps:
@@ -118,6 +127,8 @@ def lower_powers(program: KernelProgram, functions: dict[str, str]) -> KernelPro
                 value = value.xreplace({power: call(functions["power"], power.base, power.exp)})
         for power in sorted(value.atoms(CosinePower), key=sp.default_sort_key):
             value = value.xreplace({power: call(functions["cosine"], *power.args)})
+        for whole in sorted(value.atoms(sp.floor), key=sp.default_sort_key):
+            value = value.xreplace({whole: call(functions["floor"], *whole.args)})
         steps.append(replace(step, value=value))
     return program.with_steps(steps)
 
@@ -204,8 +215,9 @@ def _in_order(value: sp.Basic, pending: dict[sp.Symbol, sp.Basic]) -> list[sp.Sy
 
 
 def place(program: KernelProgram) -> KernelProgram:
-    """Each step gets the rate of its youngest symbol: pixel where x is in it, row where y is, else frame. Exact."""
-    rates: dict[str, int] = {"x": 2, "y": 1}
+    """Each step gets the rate of its youngest symbol: pixel where x is in it, row where y is, sphere where
+    a number of one sphere among many is, else frame. Exact."""
+    rates = program.input_rates()
     steps: list[Step] = []
     for step in program.steps:
         rates[step.name] = max((rates.get(name, 0) for name in step.uses()), default=0)
@@ -220,7 +232,7 @@ def hoist(program: KernelProgram) -> KernelProgram:
 
     Exact in the reals; in floating point a sum or product is associated anew, within its own rounding error.
     """
-    rates: dict[str, int] = {"x": 2, "y": 1}
+    rates = program.input_rates()
     steps: list[Step] = []
     known: dict[tuple[sp.Basic, Format], sp.Symbol] = {}
     for step in program.steps:

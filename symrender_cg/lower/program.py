@@ -12,14 +12,15 @@ import sympy as sp
 from symrender_cg.derive.symbols import symbol
 from symrender_cg.lower.nodes import Node, count
 
-Rate = Literal["frame", "row", "pixel"]
+Rate = Literal["frame", "sphere", "row", "pixel"]
 Format = Literal["int", "float32", "float64", "double_double"]
-RATES: tuple[Rate, ...] = ("frame", "row", "pixel")
+RATES: tuple[Rate, ...] = ("frame", "sphere", "row", "pixel")
+"""From the slowest to the fastest. Kernels of one sphere have no step at the rate of the sphere: it is the frame's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """name = value, once a frame, a row or a pixel. The value is a sympy expression, and after freezing a `Node`."""
+    """name = value, once a frame, a sphere, a row or a pixel. The value is a sympy expression, and after freezing a `Node`."""
 
     name: str
     value: sp.Basic
@@ -47,6 +48,9 @@ class KernelProgram:
     ends     names of the row's left and right end of the hits on it, or none: then every pixel is tested
     result   the name of the intensity where the ray hits
     inputs   names of the numbers that the kernel is called with, in the order of its scene structure
+    wanted   other names that are needed of it
+    rates    rates of its symbols that change within a frame, by the inputs' names without `scene_`
+    narrow   inputs that come in the format of the shading, from an array that another part wrote
     """
 
     name: str
@@ -56,6 +60,9 @@ class KernelProgram:
     result: str
     inputs: tuple[str, ...]
     background: str = "background"
+    wanted: tuple[str, ...] = ()
+    rates: tuple[tuple[str, Rate], ...] = (("y", "row"), ("x", "pixel"))
+    narrow: frozenset[str] = frozenset()
 
     def __getitem__(self, name: str) -> Step:
         for step in self.steps:
@@ -75,7 +82,12 @@ class KernelProgram:
         """Names that the entry points need, beside what steps use of one another."""
         ends = self.ends or ()
         scale = {"plane_unit"} if "plane_unit" in self else set()
-        return frozenset({self.result, self.background, "d_dot_d", *self.hit, *ends, *scale})
+        return frozenset({self.result, self.background, "d_dot_d", *self.hit, *ends, *scale, *self.wanted})
+
+    def input_rates(self) -> dict[str, int]:
+        """The rate of each symbol that is no step and changes within a frame, as a place in RATES."""
+        given = {name: RATES.index(rate) for name, rate in self.rates}
+        return given | {f"scene_{name}": rate for name, rate in given.items()}
 
     def with_steps(self, steps: Iterable[Step]) -> KernelProgram:
         """The same kernel with other steps."""
@@ -90,10 +102,11 @@ class KernelProgram:
     def check(self) -> None:
         """The invariants that hold after every pass: names defined once, before they are used, at no slower rate."""
         rates: dict[str, int] = {}
+        given = {*self.inputs, *self.input_rates()}
         for step in self.steps:
             assert step.name not in rates, f"{step.name} is defined twice"
             for name in step.uses():
-                known = name in rates or name in self.inputs or name in ("x", "y")
+                known = name in rates or name in given
                 assert known, f"{step.name} uses {name} before its definition"
                 assert rates.get(name, 0) <= RATES.index(step.rate), f"{step.name} changes slower than {name}"
             rates[step.name] = RATES.index(step.rate)

@@ -25,7 +25,7 @@ _STABLE_FORMS = (
 _DOUBLE_DOUBLE = frozenset(
     {
         *("depth", "offset_x", "offset_y", "image_x", "image_y", "alpha", "rho2", "reach"),
-        *("distance", "row_gap", "row_disc", "row_mid", "row_half", "x_left", "x_right"),
+        *("distance", "row_gap", "row_disc", "row_mid", "row_half", "x_left", "x_right", "power"),
     }
 )
 
@@ -72,6 +72,8 @@ VARIANTS: tuple[Variant, ...] = (
                 "before_eye",
                 "focal",
                 "plane_unit",
+                *("height2", "row_low", "row_high", "ahead", "hit_distance"),
+                *("descent", "p_x", "p_y", "p_z", "tile_u", "tile_v", "tile", "parity"),
             }
         ),
         double_double=_DOUBLE_DOUBLE,

@@ -1,7 +1,9 @@
-"""The registry of effects: for each, the condition under which it provably cannot change the image.
+"""The registry of effects: what each is, what leaving it out removes, and under which condition it provably may be.
 
-A condition is evaluated exactly, in rationals, on the camera-frame float64 numbers; tangency counts as needed.
-Adding an effect is adding an entry here, a place in the derivation, and its tests.
+Two groups. SPHERE_EFFECTS decide the kernel of one sphere and one light; each is examined exactly, in rationals, on the
+camera-frame float64 numbers. SCENE_EFFECTS decide the arrangement of everything else, subject by subject (see
+`findings`). Tangency counts as needed. Adding an effect is adding an entry here, its place in the examination and in
+the derivation, and its tests.
 """
 
 from __future__ import annotations
@@ -9,36 +11,53 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Final, Literal
 
-from symrender_cg.scene import Scene
+from symrender_cg.scene import PointLight, Scene
+
+Status = Literal["needed", "absent", "bounded"]
+
+
+FARTHEST_ASIDE: Final = 256
+"""How far off the axis a sphere may be seen, in its depth: the normal from the image of the centre loses so many units
+of its last place, and beyond it the kernel for a sphere in the plane of the eye is the accurate one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What examining a scene for one effect found; the margin is the slack of the inequality in the reason."""
+    """What examining one subject for one effect found; the margin is the slack of the inequality in the reason.
+
+    subject: such as `spheres[3] on spheres[0] from lights[1]`; empty where the effect has only one. bound: what the
+    image may change by where the effect is neither needed nor absent, but left out within a tolerance.
+    """
 
     needed: bool
     reason: str
     margin: float | None = None
+    subject: str = ""
+    bound: float | None = None
+
+    @property
+    def status(self) -> Status:
+        """`needed`, `absent` or `bounded`, the words that are printed."""
+        return "needed" if self.needed else "absent" if self.bound is None else "bounded"
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One effect: what it is, what leaving it out removes from the kernel, and how a scene is examined for it.
+    """One effect: what it is, what leaving it out removes from the kernel, and the condition under which it is absent.
 
-    `optional` effects may be forced in; the others are facts of the geometry that no kernel has a use for.
+    `examine` is that of SPHERE_EFFECTS. `optional` effects may be forced in; the others are facts of the geometry that
+    no kernel has a use for, or what the shape of the image asks for.
     """
 
     name: str
     title: str
     removes: str
-    examine: Callable[[Scene], Finding]
+    examine: Callable[[Scene], Finding] | None = None
     optional: bool = True
-
-
-FARTHEST_ASIDE = 256
-"""How far off the axis a sphere may be seen, in its depth: the normal from the image of the centre loses so many units
-of its last place, and beyond it the kernel for a sphere in the plane of the eye is the accurate one."""
+    condition: str = ""
+    source: str = ""
 
 
 def _off_axis(scene: Scene) -> Finding:
@@ -49,7 +68,12 @@ def _off_axis(scene: Scene) -> Finding:
 
 
 def _front_test(scene: Scene) -> Finding:
-    sphere = scene.spheres[0]
+    return reaches_eye(scene, 0)
+
+
+def reaches_eye(scene: Scene, index: int) -> Finding:
+    """Whether a sphere reaches the plane of the eye, or is seen so far aside that it all but does."""
+    sphere = scene.spheres[index]
     eye = Fraction(scene.camera.eye[2])
     depth = eye - Fraction(sphere.center[2])
     margin = float(depth - Fraction(sphere.radius))
@@ -71,18 +95,21 @@ def _front_test(scene: Scene) -> Finding:
     )
 
 
-def _diffuse(scene: Scene) -> Finding:
-    coefficient, intensity = scene.spheres[0].material.diffuse, scene.lights[0].intensity
+def _term(scene: Scene, name: str) -> Finding:
+    coefficient, light = getattr(scene.spheres[0].material, name), scene.lights[0]
+    assert isinstance(light, PointLight), "one sphere's kernel has a point light"
+    intensity = light.intensity
     if coefficient == 0.0 or intensity == 0.0:
-        return Finding(False, f"diffuse {coefficient:.6g} times light intensity {intensity:.6g} is 0")
-    return Finding(True, f"diffuse coefficient {coefficient:.6g}, light intensity {intensity:.6g}")
+        return Finding(False, f"{name} {coefficient:.6g} times light intensity {intensity:.6g} is 0")
+    return Finding(True, f"{name} coefficient {coefficient:.6g}, light intensity {intensity:.6g}")
+
+
+def _diffuse(scene: Scene) -> Finding:
+    return _term(scene, "diffuse")
 
 
 def _specular(scene: Scene) -> Finding:
-    coefficient, intensity = scene.spheres[0].material.specular, scene.lights[0].intensity
-    if coefficient == 0.0 or intensity == 0.0:
-        return Finding(False, f"specular {coefficient:.6g} times light intensity {intensity:.6g} is 0")
-    return Finding(True, f"specular coefficient {coefficient:.6g}, light intensity {intensity:.6g}")
+    return _term(scene, "specular")
 
 
 def _specular_gate(scene: Scene) -> Finding:
@@ -98,11 +125,148 @@ def _self_shadow(scene: Scene) -> Finding:
     return Finding(False, "a sphere is convex: where n.l > 0 the way to the light leaves it; where not, diffuse is 0")
 
 
-EFFECTS: tuple[Effect, ...] = (
+SPHERE_EFFECTS: tuple[Effect, ...] = (
     Effect("off_axis", "sphere off the axis", "the image of the centre, the tilt of the conic", _off_axis),
-    Effect("front_test", "sphere at the plane of the eye", "the test m.D > 0; a row's hits are one span", _front_test),
-    Effect("diffuse", "diffuse term", "max(0, n.l)", _diffuse),
-    Effect("specular", "specular term", "the mirrored ray and the power", _specular),
+    Effect(
+        "front_test",
+        "sphere at the plane of the eye",
+        "the test m.D > 0; a row's hits are one span",
+        _front_test,
+        condition="depth of the centre > R, and not 256 times farther off the axis",
+    ),
+    Effect(
+        "diffuse",
+        "diffuse term",
+        "max(0, n.l)",
+        _diffuse,
+        condition="k_d I = 0, or psi >= phi_E + phi_L: the caps that eye and light see are apart",
+        source="Phong 1975",
+    ),
+    Effect(
+        "specular",
+        "specular term",
+        "the mirrored ray and the power",
+        _specular,
+        condition="k_s I = 0, or the caps apart where the highlight is gated",
+        source="Phong 1975",
+    ),
     Effect("specular_gate", "gated specular", "the test n.l > 0 of the highlight", _specular_gate),
-    Effect("self_shadow", "shadow of the sphere on itself", "a shadow ray", _self_shadow, optional=False),
+    Effect(
+        "self_shadow",
+        "shadow of the sphere on itself",
+        "a shadow ray",
+        _self_shadow,
+        optional=False,
+        condition="convex",
+    ),
 )
+
+SCENE_EFFECTS: tuple[Effect, ...] = (
+    Effect(
+        "behind_eye",
+        "spheres behind the eye",
+        "the sphere, from what the eye sees",
+        condition="depth of the centre <= -R (exact)",
+    ),
+    Effect(
+        "in_view",
+        "spheres outside the window",
+        "the sphere, from what the eye sees",
+        condition="n.m <= -R for the inward unit normal n of one side of the window",
+        source="view frustum culling, Clark 1976",
+    ),
+    Effect(
+        "hidden",
+        "hidden spheres",
+        "the sphere, from what the eye sees",
+        condition="gamma + beta <= alpha and pow_A(E) < pow_B(E), A and B disjoint; B inside A; the plane between",
+    ),
+    Effect(
+        "order",
+        "order along the ray",
+        "the comparison of depths; the first hit is the last",
+        condition="|C_A - C_B| >= R_A + R_B: the smaller power |E - C|^2 - R^2 is in front on every ray",
+        source="power diagrams, Aurenhammer 1987",
+    ),
+    Effect(
+        "plane", "the plane", "the plane", condition="n.D >= 0 at the four corners of the window, no mirror shows it"
+    ),
+    Effect(
+        "checker",
+        "tiles of the plane",
+        "floor and parity",
+        condition="equal materials, or the quadrangle that the window cuts out lies in one tile",
+    ),
+    Effect(
+        "lights",
+        "lights on surfaces",
+        "the light, from the sum on that surface",
+        condition="both its terms absent; inside another sphere; on the other side of the plane",
+    ),
+    Effect(
+        "shadow",
+        "shadows of spheres",
+        "the test of that blocker",
+        condition="B misses the hull of the light and A; on the plane: B below it or above the light",
+        source="shadow volumes, Crow 1977",
+    ),
+    Effect(
+        "plane_shadow",
+        "shadow of the plane",
+        "the test of the plane",
+        optional=False,
+        condition="what is seen is on the eye's side of the plane: a light is there too, or dark for every sphere",
+    ),
+    Effect(
+        "mirror",
+        "reflections",
+        "the test of the mirrored ray against that surface",
+        condition="reflect = 0; or below the tangent plane of every visible point; mirror image outside the window",
+        source="Whitted 1980",
+    ),
+    Effect(
+        "mirror_depth",
+        "reflections of reflections",
+        "deeper bounces",
+        condition="no longer chain of mirrors that may see one another",
+        source="Whitted 1980",
+    ),
+    Effect("attenuation", "lights that fade with distance", "1 / (a + b l + c l^2)", condition="(a, b, c) = (1, 0, 0)"),
+    Effect(
+        "directional",
+        "lights from a direction",
+        "the light's direction as a constant",
+        optional=False,
+        condition="the light is at a point",
+    ),
+    Effect(
+        "gradient",
+        "background in two colours",
+        "the background's blend",
+        optional=False,
+        condition="bottom = top, or one background for all directions",
+    ),
+    Effect(
+        "colour", "colour", "two of three channels", optional=False, condition="every colour of the scene is one number"
+    ),
+    Effect(
+        "clip",
+        "clipping at 1",
+        "the upper clamp, when the image is clipped",
+        optional=False,
+        condition="k_a + sum of I (k_d + k_s), and what mirrors add, <= 1",
+    ),
+)
+
+EFFECTS: tuple[Effect, ...] = SPHERE_EFFECTS + SCENE_EFFECTS
+
+SCENE = "scene"
+"""Not an effect: forcing it takes the kernel of many-sphere scenes for any scene."""
+
+
+def effect(name: str) -> Effect:
+    """The effect of that name. Raises KeyError where there is none."""
+    for entry in EFFECTS:
+        if entry.name == name:
+            return entry
+    raise KeyError(name)

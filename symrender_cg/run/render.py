@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from symrender_cg.errors import ArgumentError
-from symrender_cg.pipeline import compile_kernel
-from symrender_cg.run.numbers import numbers_of
+from symrender_cg.errors import ArgumentError, OutsidePlanError
+from symrender_cg.pipeline import draw, pixel_size
+from symrender_cg.run.scene_kernel import LAYERS, layer_arrays
 from symrender_cg.run.threads import over_rows, thread_count
-from symrender_cg.scene import Scene, load_scene
+from symrender_cg.scene import PointLight, Scene, load_scene
+
+if TYPE_CHECKING:
+    from symrender_cg.plan.plan import Plan
 
 LARGEST_SIDE = 1 << 24
 
@@ -32,39 +36,84 @@ def render_image(
     backend: str = "native",
     cache: str | Path | None = None,
 ) -> NDArray[Any]:
-    """The image of a scene: linear intensity, shape (height, width), row 0 at the top.
+    """The image of a scene: linear intensity, shape (height, width), or (height, width, 3) for a scene with colours.
+
+    Row 0 is at the top.
 
     scene      a Scene, a built-in scene's name, a path of a TOML file; none is Chapter 1's scene
     accuracy   "literal" (the seed's formula), "double" (cancellation-free float64), "single" (float32, returns it)
     clip       cut to [0, 1] as a picture is; False keeps the field itself, which may exceed 1
     out        array of that shape and dtype to write into; any strides, writable
     threads    threads over rows; any number gives the same bits
-    bake       fold the scene's numbers into the kernel: faster, but a kernel for this scene alone
+    bake       fold the scene's numbers into the kernel: faster, but a kernel for this scene alone (one sphere)
     portable   compile for any processor of this kind, not for this machine's own
-    backend    "native", or "numpy", which needs no compiler ("double" and "literal" by hand-written numpy, slower)
+    backend    "native", or "numpy", which needs no compiler (by hand-written numpy, slower)
     cache      folder for compiled kernels; by default SYMRENDER_CACHE_DIR, or the user's cache folder
 
     Raises ArgumentError, SceneError, OutsidePlanError or ToolchainError, see symrender_cg.errors.
     """
     width, height = _side("width", width), _side("height", height)
     chosen = load_scene(scene)
-    frame = chosen.in_camera_frame()
-    pixel = pixel_size(frame, height)
+    shape = shape_of(chosen, height, width)
     if backend == "numpy":
-        values = _numpy_backend(frame, *_grid(width, height, pixel), accuracy, clip)
-        return values if out is None else _copied(values, _checked(out, (height, width), values.dtype))
+        frame = chosen.in_camera_frame()
+        values = _numpy_backend(frame, *_grid(width, height, pixel_size(frame, height)), accuracy, clip)
+        return values if out is None else _copied(values, _checked(out, shape, values.dtype))
     _require_native(backend)
-    kernel = compile_kernel(chosen, accuracy, bake=bake, portable=portable, cache=cache)
-    image = np.empty((height, width), kernel.dtype) if out is None else _checked(out, (height, width), kernel.dtype)
-    target = image if _rows_are_contiguous(image) else np.empty((height, width), kernel.dtype)
-    numbers = kernel.numbers(numbers_of(frame))
-    white = 1.0 if clip else math.inf
+    drawing = draw(chosen, accuracy, size=(width, height), clip=clip, bake=bake, portable=portable, cache=cache)
+    image = np.empty(shape, drawing.dtype) if out is None else _checked(out, shape, drawing.dtype)
+    target = image
+    if drawing.shape(height, width) != shape or not _rows_are_contiguous(image):
+        target = np.empty(drawing.shape(height, width), drawing.dtype)
+    over_rows(partial(drawing.rows, target), height, thread_count(threads, width * height))
+    return image if target is image else _copied(_as_colour(target, shape), image)
 
-    def render(begin: int, end: int) -> None:
-        kernel.rows(target, numbers, pixel=pixel, white=white, begin=begin, end=end)
 
-    over_rows(render, height, thread_count(threads, width * height))
-    return image if target is image else _copied(target, image)
+def render_layers(
+    scene: Scene | str | Path | None = None,
+    width: int = 256,
+    height: int = 256,
+    *,
+    layers: Iterable[str] = LAYERS,
+    accuracy: str = "double",
+    clip: bool = False,
+    threads: int | None = None,
+    portable: bool = False,
+    cache: str | Path | None = None,
+) -> dict[str, NDArray[Any]]:
+    """The image and what else its kernel knows of each pixel, by name; arguments as for render_image.
+
+    image        as render_image returns it, but for `clip`
+    depth        distance from the eye to what is seen, scene units; inf where nothing is; (height, width)
+    normal       outward unit normal in the camera's frame; 0 where nothing is; (height, width, 3)
+    index        which sphere of scene.spheres, len(scene.spheres) for the plane, -1 for the background; int32
+    background, ambient, reflected     terms of the image, of its shape
+    diffuse, specular                  the same for each light: (lights, *image.shape)
+
+    The terms add up to the unclipped image. Raises ArgumentError for an unknown name.
+    """
+    width, height = _side("width", width), _side("height", height)
+    names = tuple(dict.fromkeys(layers))
+    if unknown := [name for name in names if name not in LAYERS]:
+        raise ArgumentError(f"layers: {unknown[0]!r} is not known; expected some of {', '.join(LAYERS)}")
+    chosen = load_scene(scene)
+    drawing = draw(
+        chosen, accuracy, size=(width, height), clip=clip, portable=portable, force=("scene",), cache=cache
+    )
+    arrays = layer_arrays(names, (height, width), drawing.channels, len(chosen.lights))
+    image = np.empty(drawing.shape(height, width), drawing.dtype)
+    over_rows(partial(drawing.rows, image, layers=arrays), height, thread_count(threads, width * height))
+    shape = shape_of(chosen, height, width)
+    found: dict[str, NDArray[Any]] = {"image": _as_colour(image, shape).copy()}
+    for name, array in arrays.items():
+        if name == "index":
+            found[name] = _scene_indices(array, drawing.plan)
+        elif name in ("depth", "normal"):
+            found[name] = array
+        else:
+            grey = array if drawing.channels == 3 else array[..., 0]
+            found[name] = _as_colour(grey, (*array.shape[:-3], *shape)).copy()
+    return found
 
 
 def evaluate(
@@ -79,7 +128,8 @@ def evaluate(
     backend: str = "native",
     cache: str | Path | None = None,
 ) -> NDArray[Any]:
-    """The intensity at points (x, y) of the image plane, in scene units; x and y broadcast, the result has their shape.
+    """The intensity at points (x, y) of the image plane, in scene units; x and y broadcast, the result has their shape,
+    and a last axis of 3 channels for a scene with colours.
 
     The plane passes through the point looked at, x to the right and y upwards. On the pixel centres of an image the
     values are those of `render_image`, bit for bit. Arguments as there, but `clip` is off by default.
@@ -90,23 +140,28 @@ def evaluate(
     if backend == "numpy":
         return _numpy_backend(chosen.in_camera_frame(), points_x, points_y, accuracy, clip)
     _require_native(backend)
-    kernel = compile_kernel(chosen, accuracy, bake=bake, portable=portable, cache=cache)
-    values = np.empty(points_x.shape, kernel.dtype)
-    kernel.points(
-        values,
-        np.ascontiguousarray(points_x),
-        np.ascontiguousarray(points_y),
-        kernel.numbers(numbers_of(chosen)),
-        white=1.0 if clip else math.inf,
-    )
-    return values
+    drawing = draw(chosen, accuracy, clip=clip, bake=bake, portable=portable, cache=cache)
+    values = np.empty(drawing.shape(*points_x.shape), drawing.dtype)
+    drawing.points(values, np.ascontiguousarray(points_x), np.ascontiguousarray(points_y))
+    return np.array(_as_colour(values, shape_of(chosen, *points_x.shape)))
 
 
-def pixel_size(frame: Scene, height: int) -> float:
-    """The side of a pixel of an image with that many rows, in scene units; `frame` is a camera-frame scene."""
-    half_height = frame.camera.half_height
-    assert half_height is not None, "a camera-frame scene has its half_height"
-    return 2.0 * half_height / height
+def shape_of(scene: Scene, *points: int) -> tuple[int, ...]:
+    """The shape of a scene's intensities at an array of points of that shape."""
+    return points if scene.channels == 1 else (*points, scene.channels)
+
+
+def _as_colour(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """Grey values of a scene whose colours are all grey, in its three channels; others as they are."""
+    return values if values.shape == shape else np.broadcast_to(values[..., np.newaxis], shape)
+
+
+def _scene_indices(positions: NDArray[Any], plan: Plan) -> NDArray[Any]:
+    """Positions in the kernel's arrays as indices of the scene's spheres."""
+    assert plan.arrangement is not None, "layers come from the kernel of scenes"
+    spheres, plane = plan.arrangement.spheres, len(plan.given.spheres)
+    table = np.concatenate((spheres, [plane] * (plan.arrangement.receivers - len(spheres)), [-1])).astype(np.int32)
+    return table[positions]
 
 
 def _grid(width: int, height: int, pixel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -119,13 +174,33 @@ def _numpy_backend(
     frame: Scene, x: NDArray[np.float64], y: NDArray[np.float64], accuracy: str, clip: bool
 ) -> NDArray[Any]:
     from symrender_cg.lower.variants import variant
-    from symrender_cg.reference.vectorised import evaluate_vectorised
 
     chosen = variant(accuracy)
     dtype: DTypeLike = np.float32 if chosen.shading == "float32" else np.float64
     form: Literal["stable", "literal"] = "stable" if chosen.exact else "literal"
-    values = evaluate_vectorised(frame, x, y, form=form).astype(dtype, copy=False)
+    if _is_one_sphere(frame):
+        from symrender_cg.reference.vectorised import evaluate_vectorised
+
+        values = evaluate_vectorised(frame, x, y, form=form)
+    elif chosen.exact:
+        from symrender_cg.reference.brute_force import trace
+
+        values = trace(frame, *np.broadcast_arrays(x, y)).value
+    else:
+        raise OutsidePlanError(
+            f"accuracy: {accuracy!r} is the formula of one sphere under one light; this scene has more; use 'double'"
+        )
+    values = values.astype(dtype, copy=False)
     return np.clip(values, 0.0, 1.0) if clip else values
+
+
+def _is_one_sphere(frame: Scene) -> bool:
+    """Whether the numpy form of Chapter 1's formula is all that the scene calls for."""
+    if len(frame.spheres) != 1 or len(frame.lights) != 1 or frame.plane is not None or frame.channels != 1:
+        return False
+    light, mirror = frame.lights[0], frame.spheres[0].material.reflect
+    plain = isinstance(light, PointLight) and light.attenuation == (1.0, 0.0, 0.0)
+    return plain and isinstance(frame.background, float) and (mirror == 0.0 or frame.background == 0.0)
 
 
 def _require_native(backend: str) -> None:
@@ -165,11 +240,11 @@ def _coordinates(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return points
 
 
-def _checked(out: NDArray[Any], shape: tuple[int, int], dtype: np.dtype[Any]) -> NDArray[Any]:
+def _checked(out: NDArray[Any], shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
     if not isinstance(out, np.ndarray):
         raise ArgumentError(f"out: expected a numpy array of shape {shape} and dtype {dtype}, not {type(out).__name__}")
     if out.shape != shape:
-        raise ArgumentError(f"out: has shape {out.shape}; expected (height, width) = {shape}")
+        raise ArgumentError(f"out: has shape {out.shape}; expected (height, width{', 3' if len(shape) == 3 else ''}) = {shape}")
     if out.dtype != dtype:
         raise ArgumentError(f"out: has dtype {out.dtype}; this accuracy writes {dtype}")
     if not out.flags.writeable:
@@ -179,7 +254,8 @@ def _checked(out: NDArray[Any], shape: tuple[int, int], dtype: np.dtype[Any]) ->
 
 def _rows_are_contiguous(image: NDArray[Any]) -> bool:
     item = image.itemsize
-    return image.strides[1] == item and image.strides[0] % item == 0 and image.ctypes.data % item == 0
+    steps = (item,) if image.ndim == 2 else (item * image.shape[2], item)
+    return image.strides[1:] == steps and image.strides[0] % item == 0 and image.ctypes.data % item == 0
 
 
 def _copied(values: NDArray[Any], out: NDArray[Any]) -> NDArray[Any]:

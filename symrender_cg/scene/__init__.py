@@ -1,11 +1,19 @@
 """The scene: what is to be seen, checked when it is made, and its numbers in the camera's frame.
 
-    model           Scene, Camera, Sphere, Phong, PointLight
-    values          checks of single numbers, vectors and switches
+    model           Scene
+    camera          Camera
+    surfaces        Sphere, Plane, Gradient
+    materials       Phong
+    lights          PointLight, DirectionalLight
+    values          checks of single numbers, colours, vectors and switches
     exact           whole-number arithmetic on lengths, rounded once
+    brightest       refuses intensities beyond float64
     camera_frame    Scene -> the same scene seen from (0, 0, e)
+    turning         points and directions -> their coordinates in that frame
+    framing         spheres -> the half-height that frames them
     files           TOML text <-> Scene
     builtin         scenes by name; load_scene
+    random          scenes of many random disjoint spheres
 
 Never done here: rendering, symbols, or a decision about effects. Importing it loads no numpy and no sympy.
 """
@@ -15,12 +23,36 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from symrender_cg.scene.exact import Vector
-from symrender_cg.scene.model import Camera, Phong, PointLight, Scene, Sphere
+from symrender_cg.scene.model import (
+    Camera,
+    Colour,
+    DirectionalLight,
+    Gradient,
+    Light,
+    Phong,
+    Plane,
+    PointLight,
+    Scene,
+    Sphere,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = ["Camera", "Phong", "PointLight", "Scene", "Sphere", "Vector", "load_scene"]
+__all__ = [
+    "Camera",
+    "Colour",
+    "DirectionalLight",
+    "Gradient",
+    "Light",
+    "Phong",
+    "Plane",
+    "PointLight",
+    "Scene",
+    "Sphere",
+    "Vector",
+    "load_scene",
+]
 
 
 def load_scene(name_or_path: str | Path | Scene | None) -> Scene:

@@ -12,8 +12,8 @@ every result is multiplied by exactly 2^k as long as nothing is subnormal.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import TypeAlias
+from collections.abc import Iterable, Sequence
+from typing import Protocol, TypeAlias
 
 Vector: TypeAlias = tuple[float, float, float]
 GridVector: TypeAlias = tuple[int, int, int]
@@ -21,6 +21,15 @@ GridVector: TypeAlias = tuple[int, int, int]
 _SIGNIFICAND_BITS = 53
 _ROOT_BITS = 64
 """Bits of a square root before it is rounded to 53: enough for one rounding, the rest is one sticky bit."""
+
+
+class Ball(Protocol):
+    """What has a centre and a radius > 0."""
+
+    @property
+    def center(self) -> Vector: ...
+    @property
+    def radius(self) -> float: ...
 
 
 def grid_of(values: Iterable[float]) -> int:
@@ -89,9 +98,41 @@ def nearest_root(numerator: int, radicand: int, grid: int) -> float:
     return nearest_ratio(signed if numerator > 0 else -signed, 1, grid - shift - 1)
 
 
+def side_of_plane(point: Vector, on_plane: Vector, normal: Vector) -> int:
+    """Sign of normal . (point - on_plane), exact: 1 on the side of the normal, 0 on the plane, -1 behind it."""
+    grid = grid_of((*point, *on_plane))
+    offset = difference(vector_on_grid(point, grid), vector_on_grid(on_plane, grid))
+    side = dot(offset, vector_on_grid(normal, grid_of(normal)))
+    return (side > 0) - (side < 0)
+
+
+def are_parallel(a: Vector, b: Vector) -> bool:
+    """Whether a x b = 0, exact; a vector of length 0 is parallel to all."""
+    return not any(cross(vector_on_grid(a, grid_of(a)), vector_on_grid(b, grid_of(b))))
+
+
 def excess_over_sphere(eye: Vector, center: Vector, radius: float) -> int:
     """Sign of |eye - center|^2 - radius^2, exact: 1 outside the sphere, 0 on it, -1 inside."""
     grid = grid_of((*eye, *center, radius))
     offset = difference(vector_on_grid(center, grid), vector_on_grid(eye, grid))
     excess = dot(offset, offset) - on_grid(radius, grid) ** 2
     return (excess > 0) - (excess < 0)
+
+
+def first_not_outside(eye: Vector, balls: Sequence[Ball]) -> int | None:
+    """The first index whose sphere the eye is in or on, exact; None when the eye is outside every one.
+
+    The float64 value of |eye - center|^2 is within 6 units of 2^-53 of the true one between 1e-280 and 1e300, that of
+    radius^2 within one; where the first is larger by 1e-12 of itself the sign is proved, elsewhere it is decided in
+    whole numbers.
+    """
+    e_x, e_y, e_z = eye
+    for index, ball in enumerate(balls):
+        x, y, z = ball.center
+        x, y, z = x - e_x, y - e_y, z - e_z
+        square, radius = x * x + y * y + z * z, ball.radius
+        if 1e-280 < square < 1e300 and radius * radius < square * (1.0 - 1e-12):
+            continue
+        if excess_over_sphere(eye, ball.center, radius) <= 0:
+            return index
+    return None

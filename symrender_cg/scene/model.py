@@ -1,4 +1,4 @@
-"""The scene model: camera, spheres with their material, point lights, background; frozen, checked, equal by value.
+"""The scene model: a camera, spheres, lights, a plane, a background; frozen, checked, equal by value, hashable.
 
 Comes in: numbers from Python or from a scene file. Goes out: a Scene of plain floats and tuples that has an image, or a
 SceneError that names the value, its place, what was expected and what to do. Lengths share one unit of the user's
@@ -9,7 +9,7 @@ Every field has the value of Chapter 1's scene as its default: one unit sphere, 
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from os import PathLike
 
 from msgspec import Struct
@@ -17,143 +17,106 @@ from msgspec.structs import force_setattr
 
 from symrender_cg.errors import SceneError
 from symrender_cg.scene import exact, values
+from symrender_cg.scene.brightest import check_brightest
+from symrender_cg.scene.camera import Camera
 from symrender_cg.scene.exact import Vector
+from symrender_cg.scene.lights import DirectionalLight, Light, PointLight
+from symrender_cg.scene.materials import Phong
+from symrender_cg.scene.surfaces import Gradient, Plane, Sphere
+from symrender_cg.scene.values import Colour
+
+__all__ = [
+    "MOST_BOUNCES",
+    "Camera",
+    "Colour",
+    "DirectionalLight",
+    "Gradient",
+    "Light",
+    "Phong",
+    "Plane",
+    "PointLight",
+    "Scene",
+    "Sphere",
+]
+
+MOST_BOUNCES = 16
+"""The largest `max_bounces` of a scene."""
 
 
-class Phong(Struct, frozen=True, forbid_unknown_fields=True):
-    """I = ambient + sum over lights of intensity (diffuse max(0, n.l) + specular max(0, r.v)^shininess)   (Phong 1975)
+class Scene(Struct, frozen=True, forbid_unknown_fields=True, cache_hash=True):
+    """What is to be seen: a camera, spheres, lights, the background where nothing is hit, and perhaps a plane.
 
-    Four numbers >= 0 without a unit; a sum above 1 is allowed, clipping is the renderer's last step.
-    gate_specular: True adds the specular term only where n.l > 0, so that a light behind a surface leaves no highlight.
-    """
+    background: a colour >= 0 or a Gradient. shadows: whether surfaces keep light from each other.
+    max_bounces: how often a ray is mirrored before what is left of it is 0; 0 to 16.
 
-    ambient: float = 0.1
-    diffuse: float = 0.7
-    specular: float = 0.5
-    shininess: float = 32.0
-    gate_specular: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("ambient", "diffuse", "specular"):
-            meaning, remedy = f"the {name} coefficient", "write 0 to leave the term out"
-            force_setattr(self, name, values.non_negative(name, getattr(self, name), meaning, remedy))
-        shininess = values.non_negative("shininess", self.shininess, "a shininess", "a wide highlight has one near 1")
-        force_setattr(self, "shininess", shininess)
-        force_setattr(self, "gate_specular", values.flag("gate_specular", self.gate_specular, "a switch"))
-
-
-class Sphere(Struct, frozen=True, forbid_unknown_fields=True):
-    """|X - center| = radius, with its material; center and radius in scene units, radius > 0."""
-
-    center: Vector = (0.0, 0.0, 0.0)
-    radius: float = 1.0
-    material: Phong = Phong()
-
-    def __post_init__(self) -> None:
-        force_setattr(self, "center", values.vector("center", self.center, "the centre of a sphere"))
-        remedy = "leave the sphere out of the scene if it should not be seen"
-        force_setattr(self, "radius", values.positive("radius", self.radius, "a radius in scene units", remedy))
-        values.instance("material", self.material, Phong, "Phong(ambient=0.1, diffuse=0.7, specular=0.5, shininess=32)")
-
-
-class PointLight(Struct, frozen=True, forbid_unknown_fields=True):
-    """A light at `position` (scene units), `intensity` >= 0, the same at every distance; it may lie inside a sphere."""
-
-    position: Vector = (5.0, 5.0, 10.0)
-    intensity: float = 1.0
-
-    def __post_init__(self) -> None:
-        force_setattr(self, "position", values.vector("position", self.position, "the position of a light"))
-        remedy = "write 0 to switch the light off"
-        force_setattr(self, "intensity", values.non_negative("intensity", self.intensity, "an intensity", remedy))
-
-
-class Camera(Struct, frozen=True, forbid_unknown_fields=True):
-    """A pinhole at `eye`; its image plane passes through `look_at`, perpendicular to the view.
-
-    `up` is a direction of any length > 0 that is not parallel to the view; its part along the view has no effect.
-    `half_height` is the vertical half-extent of the image on that plane, in scene units, > 0; None frames the spheres.
-    """
-
-    eye: Vector = (0.0, 0.0, 4.0)
-    look_at: Vector = (0.0, 0.0, 0.0)
-    up: Vector = (0.0, 1.0, 0.0)
-    half_height: float | None = None
-
-    def __post_init__(self) -> None:
-        force_setattr(self, "eye", values.vector("eye", self.eye, "the position of the eye"))
-        force_setattr(self, "look_at", values.vector("look_at", self.look_at, "the point that the eye looks at"))
-        force_setattr(self, "up", values.vector("up", self.up, "the direction that is up in the image"))
-        if self.half_height is not None:
-            meaning, remedy = "half the height of the image in scene units", "leave it out to frame the spheres"
-            force_setattr(self, "half_height", values.positive("half_height", self.half_height, meaning, remedy))
-        if self.eye == self.look_at:
-            raise SceneError(
-                "eye", f"{self.eye} is also look_at, so there is no direction of view; expected two points; move one"
-            )
-        if self.up == (0.0, 0.0, 0.0):
-            raise SceneError(
-                "up", "(0.0, 0.0, 0.0) has no direction; expected a vector of length > 0, such as (0, 1, 0)"
-            )
-        if not any(exact.cross(self._grid_up(), self._grid_backward())):
-            raise SceneError(
-                "up",
-                f"{self.up} is parallel to the view from eye {self.eye} to look_at {self.look_at}; expected a "
-                "direction that leans away from it; for a view straight down (0, 0, -1) or (1, 0, 0) will do",
-            )
-
-    def _grid_up(self) -> exact.GridVector:
-        return exact.vector_on_grid(self.up, exact.grid_of(self.up))
-
-    def _grid_backward(self) -> exact.GridVector:
-        grid = exact.grid_of((*self.eye, *self.look_at))
-        return exact.difference(exact.vector_on_grid(self.eye, grid), exact.vector_on_grid(self.look_at, grid))
-
-
-class Scene(Struct, frozen=True, forbid_unknown_fields=True):
-    """What is to be seen: a camera, spheres, point lights, and `background` >= 0, the intensity where no sphere is hit.
-
-    Raises SceneError where there is no image: eye in or on a sphere (decided exactly), or an intensity beyond float64.
+    Raises SceneError where there is no image: eye in or on a sphere, or on the plane (decided exactly), or an intensity
+    beyond float64.
     """
 
     camera: Camera = Camera()
     spheres: tuple[Sphere, ...] = (Sphere(),)
-    lights: tuple[PointLight, ...] = (PointLight(),)
-    background: float = 0.0
+    lights: tuple[PointLight | DirectionalLight, ...] = (PointLight(),)
+    background: Colour | Gradient = 0.0
+    plane: Plane | None = None
+    shadows: bool = True
+    max_bounces: int = 4
 
     def __post_init__(self) -> None:
         values.instance("camera", self.camera, Camera, "Camera(eye=(0, 0, 4), look_at=(0, 0, 0))")
         force_setattr(
             self, "spheres", values.members("spheres", self.spheres, Sphere, "Sphere(center=(0, 0, 0), radius=1)")
         )
-        force_setattr(
-            self, "lights", values.members("lights", self.lights, PointLight, "PointLight(position=(5, 5, 10))")
-        )
-        meaning, remedy = "the intensity of the background", "write 0 for black"
-        force_setattr(self, "background", values.non_negative("background", self.background, meaning, remedy))
-        eye = self.camera.eye
-        for index, sphere in enumerate(self.spheres):
-            excess = exact.excess_over_sphere(eye, sphere.center, sphere.radius)
-            if excess <= 0:
-                raise SceneError(
-                    "camera.eye",
-                    f"{eye} is {'on' if excess == 0 else 'inside'} spheres[{index}] (center {sphere.center}, radius "
-                    f"{sphere.radius!r}); expected an eye outside every sphere; move the eye or shrink the sphere",
-                )
-        self._check_brightest()
+        kinds = (PointLight, DirectionalLight)
+        force_setattr(self, "lights", values.members("lights", self.lights, kinds, "PointLight(position=(5, 5, 10))"))
+        if not isinstance(self.background, Gradient):
+            meaning, remedy = "the intensity of the background", "write 0 for black"
+            force_setattr(self, "background", values.colour("background", self.background, meaning, remedy))
+        if self.plane is not None:
+            values.instance("plane", self.plane, Plane, "Plane(point=(0, -1, 0), normal=(0, 1, 0)), or None for none")
+        force_setattr(self, "shadows", values.flag("shadows", self.shadows, "a switch"))
+        meaning = "how often a ray is mirrored"
+        force_setattr(self, "max_bounces", values.whole("max_bounces", self.max_bounces, meaning, MOST_BOUNCES))
+        self._check_eye()
+        check_brightest(self)
 
-    def _check_brightest(self) -> None:
-        """Refuse coefficients whose largest sum, ambient + sum of intensity (diffuse + specular), overflows."""
-        total = sum(light.intensity for light in self.lights)
-        for index, sphere in enumerate(self.spheres):
-            material = sphere.material
-            brightest = material.ambient + total * (material.diffuse + material.specular)
-            if not math.isfinite(brightest):
-                raise SceneError(
-                    f"spheres[{index}].material",
-                    "ambient + (sum of the lights' intensities) (diffuse + specular) is beyond float64; expected a "
-                    f"finite largest intensity, at most {values.LARGEST}; lower the coefficients or the lights",
-                )
+    def _check_eye(self) -> None:
+        """Refuse an eye in or on a sphere, or on the plane."""
+        eye = self.camera.eye
+        index = exact.first_not_outside(eye, self.spheres)
+        if index is not None:
+            sphere = self.spheres[index]
+            on = exact.excess_over_sphere(eye, sphere.center, sphere.radius) == 0
+            raise SceneError(
+                "camera.eye",
+                f"{eye} is {'on' if on else 'inside'} spheres[{index}] (center {sphere.center}, radius "
+                f"{sphere.radius!r}); expected an eye outside every sphere; move the eye or shrink the sphere",
+            )
+        plane = self.plane
+        if plane is not None and exact.side_of_plane(eye, plane.point, plane.normal) == 0:
+            raise SceneError(
+                "camera.eye",
+                f"{eye} is on the plane (point {plane.point}, normal {plane.normal}), which is seen from there as a "
+                "line; expected an eye on one side of the plane; move the eye or the plane",
+            )
+
+    @property
+    def channels(self) -> int:
+        """3 when any colour of the scene is (red, green, blue), else 1: the image is (h, w, 3) or (h, w)."""
+        return 3 if any(isinstance(colour, tuple) for colour in self._colours()) else 1
+
+    def _colours(self) -> Iterator[Colour]:
+        """Every colour of the scene, each distinct material once."""
+        if isinstance(self.background, Gradient):
+            yield from (self.background.bottom, self.background.top)
+        else:
+            yield self.background
+        for light in self.lights:
+            yield light.intensity
+        materials = {id(sphere.material): sphere.material for sphere in self.spheres}
+        if self.plane is not None:
+            materials |= {id(m): m for m in (self.plane.material, self.plane.checker) if m is not None}
+        for material in materials.values():
+            yield from (material.ambient, material.diffuse, material.specular)
 
     @classmethod
     def chapter1(

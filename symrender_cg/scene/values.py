@@ -1,4 +1,4 @@
-"""Checks of single values: anything that a caller or a file may write -> float, tuple of three floats, bool.
+"""Checks of single values: anything that a caller or a file may write -> float, colour, vector, whole number, bool.
 
 Comes in: a value of any type and its place. Goes out: a plain Python value, with -0.0 turned into 0.0, so that equal
 scenes have the same bits. Never done here: a check that needs two fields at once (that belongs to the model), or a
@@ -9,14 +9,19 @@ from __future__ import annotations
 
 import math
 import reprlib
-from numbers import Real
-from typing import Final, TypeVar
+from math import isfinite
+from numbers import Integral, Real
+from typing import Any, Final, TypeAlias, TypeVar
 
 from symrender_cg.errors import SceneError
 
 T = TypeVar("T")
 
+Colour: TypeAlias = float | tuple[float, float, float]
+"""A grey, or linear red, green and blue; each >= 0 and finite."""
+
 LARGEST: Final = "1.7976931348623157e308"
+INFINITY: Final = math.inf
 
 
 def _plain(value: object) -> object:
@@ -72,8 +77,59 @@ def non_negative(place: str, value: object, meaning: str, remedy: str) -> float:
     return result
 
 
+def fraction(place: str, value: object, meaning: str, remedy: str) -> float:
+    """`value` as a float64 of [0, 1]; `remedy` says what to write instead of a number outside."""
+    result = finite(place, value, f"{meaning}, a number from 0 to 1")
+    if not 0.0 <= result <= 1.0:
+        raise SceneError(place, f"{result!r} is not from 0 to 1; expected {meaning}, a number >= 0 and <= 1; {remedy}")
+    return result
+
+
+def whole(place: str, value: object, meaning: str, largest: int) -> int:
+    """`value` as an int of [0, largest]; numpy's whole numbers are accepted, 4.0 and true are not."""
+    plain = _plain(value)
+    expected = f"expected {meaning}, a whole number from 0 to {largest}"
+    if isinstance(plain, bool) or not isinstance(plain, Integral):
+        raise SceneError(place, f"{described(value)} is not a whole number; {expected}; write it without a point")
+    result = int(plain)
+    if not 0 <= result <= largest:
+        raise SceneError(place, f"{reprlib.repr(result)} is out of range; {expected}; write one of these")
+    return result
+
+
+def colour(place: str, value: object, meaning: str, remedy: str) -> Colour:
+    """`value` as a float64 >= 0 or a tuple of three; lists and numpy arrays of three are accepted.
+
+    A tuple of three equal numbers stays a tuple. The place of a wrong entry has its index, such as `ambient[1]`.
+    """
+    plain = _plain(value)
+    if isinstance(plain, (list, tuple)):
+        if len(plain) != 3:
+            raise SceneError(
+                place,
+                f"{reprlib.repr(plain)} has {len(plain)} entries; expected {meaning}, one number >= 0 for a grey or "
+                "exactly three (red, green, blue)",
+            )
+        red, green, blue = (
+            non_negative(f"{place}[{index}]", entry, f"the {name} of {meaning}", remedy)
+            for index, (entry, name) in enumerate(zip(plain, ("red", "green", "blue"), strict=True))
+        )
+        return red, green, blue
+    if isinstance(plain, str) or not isinstance(plain, Real):
+        raise SceneError(
+            place,
+            f"{described(value)} is not a colour; expected {meaning}, a number >= 0 for a grey or three such as "
+            "(0.9, 0.5, 0.1) for red, green and blue",
+        )
+    return non_negative(place, plain, meaning, remedy)
+
+
 def vector(place: str, value: object, meaning: str) -> tuple[float, float, float]:
     """`value` as a tuple of three finite float64; tuples, lists and numpy arrays of three are accepted."""
+    if type(value) is tuple and len(value) == 3:
+        x, y, z = value
+        if type(x) is type(y) is type(z) is float and isfinite(x) and isfinite(y) and isfinite(z):
+            return x + 0.0, y + 0.0, z + 0.0
     plain = _plain(value)
     if not isinstance(plain, (list, tuple)):
         raise SceneError(
@@ -88,6 +144,16 @@ def vector(place: str, value: object, meaning: str) -> tuple[float, float, float
     return x, y, z
 
 
+def direction(place: str, value: object, meaning: str, example: str) -> tuple[float, float, float]:
+    """`value` as a vector that is not zero; its length may be anything else."""
+    result = vector(place, value, meaning)
+    if result == (0.0, 0.0, 0.0):
+        raise SceneError(
+            place, f"{result} has no direction; expected {meaning}, a vector of length > 0, such as {example}"
+        )
+    return result
+
+
 def flag(place: str, value: object, meaning: str) -> bool:
     """`value` as a bool; numpy's bool is accepted, 0 and 1 and text are not."""
     plain = _plain(value)
@@ -96,17 +162,24 @@ def flag(place: str, value: object, meaning: str) -> bool:
     return plain
 
 
-def instance(place: str, value: object, expected: type[T], example: str) -> T:
-    """`value` when it is an `expected`; `example` shows how to write one."""
+def instance(place: str, value: object, expected: type[T] | tuple[type[T], ...], example: str) -> T:
+    """`value` when it is an `expected`, or one of them; `example` shows how to write one."""
     if not isinstance(value, expected):
-        name = expected.__name__
+        name = _named(expected)
         raise SceneError(place, f"{described(value)} is not a {name}; expected a {name}; write {example}")
     return value
 
 
-def members(place: str, value: object, expected: type[T], example: str) -> tuple[T, ...]:
-    """`value`, a tuple or list, as a tuple whose entries are all of the expected class."""
+def members(place: str, value: object, expected: type[T] | tuple[type[T], ...], example: str) -> tuple[T, ...]:
+    """`value`, a tuple or list, as a tuple whose entries are all of the expected class or classes."""
     if not isinstance(value, (list, tuple)):
-        name = expected.__name__
+        name = _named(expected)
         raise SceneError(place, f"{described(value)} is not a tuple; expected a tuple of {name}; write ({example},)")
-    return tuple(instance(f"{place}[{index}]", entry, expected, example) for index, entry in enumerate(value))
+    for index, entry in enumerate(value):
+        if not isinstance(entry, expected):
+            instance(f"{place}[{index}]", entry, expected, example)
+    return tuple(value)
+
+
+def _named(expected: type[Any] | tuple[type[Any], ...]) -> str:
+    return " or a ".join(kind.__name__ for kind in (expected if isinstance(expected, tuple) else (expected,)))

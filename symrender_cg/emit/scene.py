@@ -1,0 +1,357 @@
+"""`emit_scene(...)` -> the C text of the kernel of a scene of many spheres, lights and what else its plan calls for.
+
+The parts of the derivation become the bodies of its loops; templates/scene.c.j2 has the loops, the lists and the entry
+points, and contains no mathematics of the image. What the plan leaves out leaves the text.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from symrender_cg.derive import parts
+from symrender_cg.derive.exact import sign_tests
+from symrender_cg.derive.image import derive_sphere
+from symrender_cg.derive.parts import Part
+from symrender_cg.emit.bodies import INDENT, body, closure, counts, operations
+from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test
+from symrender_cg.emit.parts import PrimaryBodies
+from symrender_cg.emit.scene_fields import Needs, scene_fields
+from symrender_cg.lower.nodes import Call, walk
+from symrender_cg.lower.program import KernelProgram
+from symrender_cg.lower.variants import Variant
+from symrender_cg.plan.plan import Plan
+from symrender_cg.resources import template_path
+from symrender_cg.version import VERSION
+
+_LOOP = 2 * INDENT
+_DEEP = 3 * INDENT
+_TITLES = {
+    "span": "spheres before the eye: their pixels in a row are one span",
+    "near": "spheres that reach the plane of the eye: each pixel is tested",
+    "plane": "the ground plane",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Primary:
+    """What the template needs of a part that takes the eye's ray."""
+
+    name: str
+    title: str
+    bodies: PrimaryBodies
+    arguments: str
+    uses: str
+    sign_tests: tuple[dict[str, object], ...]
+    distance: list[str]
+    sight: list[str]
+    stores: list[str]
+    void_row: str
+    void_distance: str
+    void_sight: str
+    void_surface: str
+
+
+def scene_parts(need: Needs) -> dict[str, Part]:
+    """The parts of the derivation that a scene's kernel is made of."""
+    bent = need.specular or need.mirrors
+    found: list[Part] = []
+    if need.spans:
+        found.append(parts.sphere_part(near=False, mirrored=bent))
+    if need.at_eye:
+        found.append(parts.sphere_part(near=True, mirrored=bent))
+    if need.plane:
+        found.append(parts.plane_part(mirrored=bent))
+    if need.checker:
+        found.append(parts.tiles_part())
+    if need.lit:
+        found += [parts.lamp_part(), parts.reach_part("p"), parts.shading_part(glossy=False)]
+    if need.specular:
+        found.append(parts.shading_part(glossy=True))
+    if need.attenuation:
+        found.append(parts.fading_part())
+    if need.shadows:
+        found.append(parts.shadow_part("p"))
+    if need.mirrors:
+        found += [parts.echo_part("p"), parts.arrival_part("p")]
+        if need.plane:
+            found.append(parts.echo_plane_part("p"))
+    if need.gradient:
+        found.append(parts.gradient_part())
+    return {part.name: part for part in found}
+
+
+def emit_scene(
+    programs: Mapping[str, KernelProgram],
+    *,
+    need: Needs,
+    plan: Plan,
+    variant: Variant,
+    command: str,
+    name: str,
+) -> Emitted:
+    """C99 text of a scene's kernel. `command` is the line that regenerates it."""
+    single = variant.shading == "float32"
+    real = "float" if single else "double"
+    stored = _stored(need)
+    primaries = [_primary(programs[key], need, stored) for key in ("span", "near", "plane") if key in programs]
+    fields = scene_fields(need)
+    writer = _Loops(programs, need)
+    includes = _includes(programs, need)
+    held = [f"{part.name}s" for part in primaries if part.bodies.has_sphere]
+    held += ["row_first", "row_last"] if need.spheres else []
+    held += ["lamps"] if need.lit else []
+    unit = f"h->{primaries[0].name}.plane_unit" if primaries else "1.0"
+    contest = [
+        *(["scene->partners_begin[k + 1] > scene->partners_begin[k]"] if need.intersections else []),
+        *(["scene->crosses_plane[k]"] if need.crossing else []),
+    ]
+    context = {
+        "name": name,
+        "version": VERSION,
+        "command": command,
+        "plan": plan,
+        "variant": variant,
+        "title": _title(need),
+        "real": real,
+        "single": single,
+        "cast": "(float)" if single else "",
+        "zero": "0.0f" if single else "0.0",
+        "one": "1.0f" if single else "1.0",
+        "channels": need.channels,
+        "need": need,
+        "lit": need.lit,
+        "dimmed": need.shadows or need.attenuation,
+        "spheres": need.spheres,
+        "seen": need.spheres or need.plane,
+        "spans": need.spans,
+        "near": need.at_eye,
+        "contested": need.spheres and (need.intersections or need.crossing),
+        "contest": " || ".join(contest),
+        "mirrored_spheres": need.mirrors,
+        "primaries": primaries,
+        "fields": fields,
+        "width": max(len(field.declaration) for field in fields) + 3,
+        "includes": includes,
+        "point_arrays": _point_arrays(need, stored, real),
+        "held_arrays": held,
+        "missing": " || ".join(f"!h->{array}" for array in held) or "0",
+        "unit": unit,
+        "cost": _cost(programs),
+        **writer.context(),
+    }
+    source = _tidy(environment().get_template("scene.c.j2").render(context))
+    header = environment().get_template("scene.h.j2").render(context)
+    files = {f"{name}.c": source, f"{name}.h": header}
+    carried = ("grid.h", *includes, *(("power.h",) if "phong_power.h" in includes else ()))
+    files |= {h: template_path(f"support/{h}").read_text(encoding="utf-8") for h in carried}
+    total = {
+        rate: dict(sum((operations(program.at(rate)) for program in programs.values()), Counter()))  # type: ignore[arg-type]
+        for rate in ("frame", "sphere", "row", "pixel")
+    }
+    return Emitted(
+        name=name,
+        files=files,
+        cdef=environment().get_template("scene.cdef.j2").render(context),
+        inputs=tuple(field.name for field in fields),
+        result_type=real,
+        operations=total,
+        fields=tuple((field.name, field.shape) for field in fields),
+    )
+
+
+def _title(need: Needs) -> str:
+    what = "spheres" if need.spheres else "an empty scene"
+    if need.plane:
+        what = "spheres on a plane" if need.spheres else "a plane"
+    return f"{what}, every number an argument"
+
+
+def _stored(need: Needs) -> tuple[str, ...]:
+    names = ["n_x", "n_y", "n_z"]
+    names += ["p_x", "p_y", "p_z"] if need.plane else []
+    names += ["mirror_x", "mirror_y", "mirror_z", "inv_d2"] if need.specular or need.mirrors else []
+    return tuple(names)
+
+
+def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
+    groups: list[tuple[list[str], str]] = [(["n_x", "n_y", "n_z"], "outward normal")]
+    if need.plane:
+        groups.append((["p_x", "p_y", "p_z"], "the point from its receiver's origin, in its unit: a sphere's is its normal"))
+    if "inv_d2" in stored:
+        groups.append((["mirror_x", "mirror_y", "mirror_z"], "the ray mirrored there"))
+        groups.append((["inv_d2"], "one over its length squared"))
+    if need.lit:
+        groups.append((["w_x", "w_y", "w_z", "w2"], "to the lamp, and its length squared"))
+        if need.shadows or need.attenuation:
+            groups.append((["light"], "how much of the lamp's light arrives"))
+        groups.append((["cosine"], "max(0, n.l)"))
+    if need.specular:
+        groups.append((["lobe", "shininess"], "max(0, r.v)^n, and n"))
+    texts = [(f"    {real} {', '.join(f'{n}[ROOM]' for n in names)};", meaning) for names, meaning in groups]
+    width = max(len(text) for text, _ in texts) + 3
+    return [f"{text.ljust(width)}/* {meaning} */" for text, meaning in texts]
+
+
+def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Primary:
+    bodies = PrimaryBodies(program, stored)
+    kind = program.name
+    given = [("ball", f"const {kind}_sphere *ball")] if bodies.has_sphere else []
+    given.append(("f", f"const {kind}_frame *f"))
+    names = [name for name, _ in given]
+    distance = bodies.pixel(("hit_distance",) if bodies.has_sphere else ("hit_distance", "descent"))
+    sight = bodies.sight() if bodies.has_sphere else []
+    stores = [f"p->{target}[at + i] = {bodies.carried_word(source)};" for target, source in _targets(bodies, stored)]
+    tests = _sign_tests(near=kind == "near") if bodies.has_sphere else ()
+    return Primary(
+        name=kind,
+        title=_TITLES[kind],
+        bodies=bodies,
+        arguments="".join(f", {declaration}" for _, declaration in given),
+        uses="".join(f", {name}" for name in names),
+        sign_tests=tests,
+        distance=distance,
+        sight=sight,
+        stores=[_LOOP + line for line in stores],
+        void_row=_void(bodies.row.lines, names),
+        void_distance=_void(distance, ["r", *names]),
+        void_sight=_void(sight, ["r", *names]),
+        void_surface=_void([*bodies.surface, *stores], ["r", *names]),
+    )
+
+
+def _targets(bodies: PrimaryBodies, stored: Sequence[str]) -> list[tuple[str, str]]:
+    """Which array takes which quantity: a sphere's point, seen from its centre in radii, is its normal."""
+    pairs = []
+    for name in stored:
+        source = name.replace("p_", "n_") if name.startswith("p_") and bodies.has_sphere else name
+        pairs.append((name, source))
+    return pairs
+
+
+def _void(lines: Iterable[str], names: Iterable[str]) -> str:
+    text = "\n".join(lines)
+    absent = [name for name in names if f"{name}->" not in text]
+    return INDENT + " ".join(f"(void){name};" for name in absent) + "\n" if absent else ""
+
+
+def _sign_tests(*, near: bool) -> tuple[dict[str, object], ...]:
+    image = derive_sphere("sphere", front_test=near, diffuse=False, specular=False, gated=False)
+
+    def place(factor: str) -> str:
+        if factor in ("x", "y"):
+            return factor
+        return "scene->eye" if factor == "eye" else f"scene->{factor}[k]"
+
+    return tuple(printed_test(test, place) for test in sign_tests(image))
+
+
+def _includes(programs: Mapping[str, KernelProgram], need: Needs) -> list[str]:
+    uses = {
+        node.function
+        for program in programs.values()
+        for step in program.steps
+        for node in walk(step.value)
+        if isinstance(node, Call)
+    }
+    always = {"inline.h", "units.h"}
+    always |= {"span.h"} if need.spans else set()
+    always |= {"double_double.h", "exact_sign.h"} if need.spheres else set()
+    return [
+        header
+        for header, functions in SUPPORT.items()
+        if header in always or (functions and header != "double_double.h" and uses & set(functions))
+    ]
+
+
+def _cost(programs: Mapping[str, KernelProgram]) -> list[str]:
+    lines = []
+    for name, program in programs.items():
+        by_rate = [(rate, counts(program.at(rate))) for rate in ("frame", "sphere", "row", "pixel")]
+        told = ", ".join(f"a {rate}: {text}" for rate, text in by_rate if text != "none")
+        lines.append(f"{name}: {told}")
+    return lines
+
+
+def _tidy(text: str) -> str:
+    """Without the blank lines that left-out parts leave behind."""
+    lines: list[str] = []
+    for line in text.split("\n"):
+        line = line.rstrip()
+        if not line and lines and (not lines[-1] or lines[-1].endswith("{")):
+            continue
+        if line.strip() == "}" and lines and not lines[-1]:
+            lines.pop()
+        lines.append(line)
+    return "\n".join(lines)
+
+
+class _Loops:
+    """The bodies of the loops over points that wait in arrays."""
+
+    def __init__(self, programs: Mapping[str, KernelProgram], need: Needs) -> None:
+        self.programs = programs
+        self.need = need
+        self.point = "p" if need.plane else "n"
+
+    def context(self) -> dict[str, object]:
+        """What the template places, by name."""
+        found: dict[str, object] = {}
+        need = self.need
+        if need.lit:
+            found |= self._loop("reach", "reach")
+            found |= self._loop("matte", "matte")
+            lamp = {name: f"scene->{{}}[{'light' if 'light_' in name else 'k'}]" for name in self.programs["lamp"].inputs}
+            found["lamp_lines"] = body(self.programs["lamp"].steps, lamp, _LOOP)
+        if need.specular:
+            found |= self._loop("glossy", "glossy")
+        if need.attenuation:
+            found |= self._loop("fading", "fading")
+        if need.shadows:
+            found |= self._loop("shadow", "shadow", indent=_DEEP, head=_LOOP)
+        if need.checker:
+            found["tiles_lines"] = body(self.programs["tiles"].steps, {})
+        if need.gradient:
+            found["gradient_lines"] = body(self.programs["gradient"].steps, {})
+        if need.plane:
+            plane = PrimaryBodies(self.programs["plane"], ())
+            found["ground_lines"] = plane.pixel(("descent", *(("p_x", "p_y", "p_z") if need.checker else ())))
+            found["void_ground"] = _void(found["ground_lines"], ["r", "f"])  # type: ignore[arg-type]
+        if need.mirrors:
+            found |= self._loop("echo", "echo", ("disc", "ahead", "t"))
+            found |= self._loop("arrival", "arrival")
+            found["arrival_stores"] = self._stores(("n", "n"), ("mirror", "next"), own="n")
+            if need.plane:
+                first = ("descent", "t", *(("foot_x", "foot_y", "foot_z") if need.checker else ()))
+                found |= self._loop("echo_plane", "echo_plane", first)
+                second = ("foot_x", "foot_y", "foot_z", "next_x", "next_y", "next_z", "inv_d2")
+                found |= self._loop("landing", "echo_plane", second)
+                found["landing_stores"] = self._stores(("p", "foot"), ("mirror", "next"), ("n", "plane"), own=None)
+        return found
+
+    def _loop(
+        self,
+        key: str,
+        part: str,
+        results: tuple[str, ...] | None = None,
+        *,
+        indent: str = _LOOP,
+        head: str = INDENT,
+    ) -> dict[str, object]:
+        program = self.programs[part]
+        arrays = scene_parts(self.need)[part].arrays
+        places = {name: "p->{}[i]" for name in arrays}
+        places |= {f"p_{axis}": f"=p->{self.point}_{axis}[i]" for axis in "xyz"}
+        steps = program.steps if results is None else closure(program.steps, results)
+        before = [step for step in steps if step.rate != "pixel"]
+        inside = [step for step in steps if step.rate == "pixel"]
+        return {f"{key}_lines": body(inside, places, indent), f"{key}_head": body(before, places, head)}
+
+    def _stores(self, *pairs: tuple[str, str], own: str | None) -> list[str]:
+        lines = []
+        if own is not None and self.need.plane:
+            pairs = (*pairs, ("p", own))
+        for target, source in pairs:
+            lines += [f"{_LOOP}child->{target}_{axis}[j] = {source}_{axis};" for axis in "xyz"]
+        return [*lines, f"{_LOOP}child->inv_d2[j] = inv_d2;"]

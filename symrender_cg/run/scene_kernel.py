@@ -1,0 +1,128 @@
+"""`SceneKernel`: the loaded kernel of a scene of many spheres, and the scene as its C structure.
+
+The one place that knows how arrays of Python become the pointers of C, and that keeps them alive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrender_cg.build.library import CachedKernel, Library
+
+LAYERS = ("depth", "normal", "index", "background", "ambient", "reflected", "diffuse", "specular")
+"""What a kernel can write beside the image, in the order of its C structure's fields."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A scene made ready for an image of one size, or for points: the C's frame and everything it refers to."""
+
+    frame: Any
+    keeps: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class SceneKernel:
+    """A native kernel of a scene and how to call it.
+
+    name       its C name; the entry points are name_prepare, name_rows, name_points, name_release
+    fields     (name, shape) of its scene structure's fields; shape is number, whole, reals or wholes
+    channels   1 or 3
+    dtype      float64 or float32
+    """
+
+    name: str
+    fields: tuple[tuple[str, str], ...]
+    channels: int
+    dtype: np.dtype[Any]
+    cached: CachedKernel
+    library: Library
+
+    def prepare(
+        self, numbers: Mapping[str, Any], *, width: int = 1, height: int = 1, pixel: float = 1.0, white: float
+    ) -> Prepared:
+        """The scene's numbers as the C sees them, with what does not change within a frame computed."""
+        ffi, lib = self.library.ffi, self.library.lib
+        scene = ffi.new(f"{self.name}_scene *")
+        keeps: list[Any] = [scene]
+        for name, shape in self.fields:
+            value = numbers[name]
+            if shape in ("reals", "wholes"):
+                array = np.ascontiguousarray(value, dtype=np.float64 if shape == "reals" else np.int32)
+                keeps.append(array)
+                setattr(scene, name, ffi.cast("double *" if shape == "reals" else "int *", array.ctypes.data))
+            else:
+                setattr(scene, name, value)
+        grid = ffi.new("symrender_grid *", (width, height, pixel, white))
+        frame = getattr(lib, f"{self.name}_prepare")(scene, grid)
+        if frame == ffi.NULL:
+            raise MemoryError(f"no memory for the tables of {len(numbers['radius'])} spheres")
+        return Prepared(ffi.gc(frame, getattr(lib, f"{self.name}_release")), tuple(keeps))
+
+    def rows(
+        self,
+        image: NDArray[Any],
+        prepared: Prepared,
+        *,
+        begin: int,
+        end: int,
+        layers: Mapping[str, NDArray[Any]] | None = None,
+    ) -> None:
+        """Writes rows [begin, end) of an image whose rows are contiguous. Releases the GIL.
+
+        layers: by names of LAYERS, contiguous arrays of whole images; float64, int32 for `index`.
+        """
+        ffi = self.library.ffi
+        pointer = ffi.cast(f"{self._real} *", image.ctypes.data)
+        wanted = ffi.NULL
+        if layers:
+            wanted = ffi.new(f"{self.name}_layers *")
+            for name, array in layers.items():
+                setattr(wanted, name, ffi.cast("int *" if name == "index" else "double *", array.ctypes.data))
+        status = getattr(self.library.lib, f"{self.name}_rows")(
+            pointer, image.strides[0] // image.itemsize, prepared.frame, wanted, begin, end
+        )
+        if status:
+            raise MemoryError(f"no memory for rows {begin} to {end} of the image")
+
+    def points(
+        self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], prepared: Prepared
+    ) -> None:
+        """Writes the intensities at contiguous points. Releases the GIL."""
+        ffi = self.library.ffi
+        status = getattr(self.library.lib, f"{self.name}_points")(
+            ffi.cast(f"{self._real} *", values.ctypes.data),
+            ffi.cast("double *", x.ctypes.data),
+            ffi.cast("double *", y.ctypes.data),
+            x.size,
+            prepared.frame,
+        )
+        if status:
+            raise MemoryError("no memory for the points")
+
+    @property
+    def _real(self) -> str:
+        return "float" if self.dtype == np.float32 else "double"
+
+
+def layer_arrays(
+    names: Sequence[str], shape: tuple[int, int], channels: int, lights: int
+) -> dict[str, NDArray[Any]]:
+    """Empty arrays for layers of an image of that shape; terms of a light that adds none stay 0."""
+    colour = (*shape, channels)
+    shapes: dict[str, tuple[int, ...]] = {
+        "depth": shape,
+        "normal": (*shape, 3),
+        "index": shape,
+        "background": colour,
+        "ambient": colour,
+        "reflected": colour,
+        "diffuse": (lights, *colour),
+        "specular": (lights, *colour),
+    }
+    return {name: np.zeros(shapes[name], np.int32 if name == "index" else np.float64) for name in names}
