@@ -1,7 +1,7 @@
 """`python -m benchmarks agreement`: our pictures beside those of two renderers that nobody here wrote.
 
 Comes in: names of scenes, a size, rounds. Goes out: Report and its tables; with `out`, pictures: ours, the peer's, and
-100 times their difference. Never done here: the peers' scene files (povray.py, mitsuba.py).
+100 times their difference. Never done here: the peers' scene files (povray_text.py, mitsuba.py).
 
 POV-Ray draws the same image: Phong, shadows, mirrors, checker, gradient. Compared unclipped, in 8-bit levels (1/255);
 POV-Ray's numbers come in steps of 16 bits over the gain that keeps them below 1. Mitsuba answers what each pixel's ray
@@ -14,7 +14,6 @@ rigorous oracle is asked who is right.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,10 +25,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import mitsuba, povray
+from benchmarks import mitsuba, povray, povray_text
 from benchmarks.machine import Machine, Spread, cores, spread, take_turns, this_machine
+from benchmarks.scaling import warm_sample
 from benchmarks.strips import save_strip
-from symrender_cg import Scene, render_image
+from symrender_cg import Scene, render_image, render_layers
 from symrender_cg.errors import OutsidePlanError
 from symrender_cg.reference import brute_force, scene_oracle
 from symrender_cg.scene import Phong, PointLight, load_scene
@@ -66,7 +66,7 @@ class ImageAgreement:
 
 @dataclass(frozen=True, slots=True)
 class GeometryAgreement:
-    """The reference against Mitsuba: pixels with another index, those at edges, and of the others depth and normal."""
+    """Ours against Mitsuba: pixels with another index, those at edges, and of the others depth and normal."""
 
     silhouettes: int
     index_differs: int
@@ -200,7 +200,7 @@ def measure_agreement(
 
 def statable(scene: Scene) -> tuple[Scene, list[str]]:
     """The nearest scene that POV-Ray can state: gates on, some attenuations without b; and what was changed."""
-    notes = list(povray.departures(scene))
+    notes = list(povray_text.departures(scene))
 
     def gated(material: Phong) -> Phong:
         return replace(material, gate_specular=True)
@@ -209,8 +209,8 @@ def statable(scene: Scene) -> tuple[Scene, list[str]]:
     for number, light in enumerate(lights):
         if isinstance(light, PointLight):
             try:
-                povray.fades(light.attenuation)
-            except povray.NotStatedError:
+                povray_text.fades(light.attenuation)
+            except povray_text.NotStatedError:
                 a, _, c = light.attenuation
                 lights[number] = replace(light, attenuation=(a, 0.0, c))
                 notes.append(f"lights[{number}] has attenuation {light.attenuation}, drawn here as {(a, 0.0, c)}")
@@ -229,23 +229,20 @@ class _One:
         self.name, self.size, self.threads, self.out = Path(name).stem, size, threads, out
         self.scene, notes = statable(load_scene(name))
         self.notes = notes
+        self.frame = self.scene.in_camera_frame()
         self.drawn_by = "kernel"
         try:
-            self.image = self._draw()
+            self.image = np.asarray(render_image(self.scene, size, size, clip=False, threads=threads))
+            layers = render_layers(self.scene, size, size, layers=("depth", "normal", "index"), threads=threads)
+            self.depth, self.normal, self.index = layers["depth"], layers["normal"], layers["index"]
         except OutsidePlanError as reason:
             self.drawn_by = "reference"
             self.notes.append(f"drawn by the reference, since no kernel does: {reason}")
-            self.image = self._draw()
-        self.frame = self.scene.in_camera_frame()
-        self.reference = brute_force.image(self.frame, size, size)
+            traced = brute_force.image(self.frame, size, size)
+            self.image, self.depth, self.normal, self.index = traced.value, traced.depth, traced.normal, traced.index
         half = self.frame.camera.half_height
         assert half is not None, "a camera-frame scene has its half_height"
         self.pixel = 2.0 * half / size
-
-    def _draw(self) -> Floats:
-        if self.drawn_by == "kernel":
-            return np.asarray(render_image(self.scene, self.size, self.size, clip=False, threads=self.threads))
-        return brute_force.image(self.scene, self.size, self.size).value
 
     def measure(
         self, program: str | None, with_mitsuba: bool, rounds: int, seed: int, told: Callable[[str], None]
@@ -253,7 +250,7 @@ class _One:
         """Times in turns; agreement of the first pictures."""
         told(f"{self.name}: peers")
         gain = 2.0 ** -max(0, int(np.ceil(np.log2(max(float(self.image.max()), 1.0)))))
-        calls: dict[str, Callable[[], float]] = {"ours": self._milliseconds}
+        calls: dict[str, Callable[[], float]] = {"ours": warm_sample(self._draw)}
         drawn = (
             povray.draw(program, self.scene, self.size, self.size, threads=self.threads, gain=gain) if program else None
         )
@@ -276,10 +273,12 @@ class _One:
         ours_ms = spread(samples["ours"])
         return SceneReport(self.name, self.drawn_by, tuple(self.notes), ours_ms, image, geometry)
 
-    def _milliseconds(self) -> float:
-        start = time.perf_counter()
-        self._draw()
-        return 1e3 * (time.perf_counter() - start)
+    def _draw(self) -> None:
+        """An image into the array that there is, or one of the reference."""
+        if self.drawn_by == "kernel":
+            render_image(self.scene, self.size, self.size, clip=False, threads=self.threads, out=self.image)
+        else:
+            brute_force.image(self.frame, self.size, self.size)
 
     def _against_povray(self, drawn: povray.Drawn, trace_ms: Spread) -> ImageAgreement:
         apart = np.abs(self.image - drawn.image)
@@ -312,17 +311,17 @@ class _One:
         )
 
     def _against_mitsuba(self, found: mitsuba.Layers) -> GeometryAgreement:
-        index = self.reference.index
+        index = self.index
         rows, columns = np.nonzero(index != found.index)
         around = self._around(rows, columns).index
         same = (index == found.index) & (index >= 0)
-        depth = np.abs(found.depth[same] / self.reference.depth[same] - 1.0)
-        normal = np.abs(found.normal - self.reference.normal).max(axis=-1)[same]
+        depth = np.abs(found.depth[same] / self.depth[same] - 1.0)
+        normal = np.abs(found.normal - self.normal).max(axis=-1)[same]
         beside = np.zeros(index.shape, dtype=bool)
         beside[:, 1:] |= index[:, 1:] != index[:, :-1]
         beside[1:] |= index[1:] != index[:-1]
         if self.out is not None:
-            ours, theirs = (np.where(n != 0.0, 0.5 + 0.5 * n, 0.0) for n in (self.reference.normal, found.normal))
+            ours, theirs = (np.where(n != 0.0, 0.5 + 0.5 * n, 0.0) for n in (self.normal, found.normal))
             save_strip(self.out / f"{self.name}-mitsuba-normals.png", ours, theirs)
         return GeometryAgreement(
             silhouettes=int(beside.sum()),

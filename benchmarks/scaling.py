@@ -36,6 +36,9 @@ SHORTEST_SAMPLE: Final = 0.01
 """Seconds: what is faster is called several times for one sample."""
 
 LEVEL: Final = 1.0 / 255.0
+OTHER_PICTURE: Final = 0.01
+"""The part of the pixels from which on a ratio of times would compare two different pictures."""
+
 GAIN: Final = 0.5
 """Of POV-Ray's intensities, which end at 1; the brightest of these scenes is 1.3."""
 
@@ -44,8 +47,9 @@ POV, POV_BSP, AS_IS, LEAN = "POV-Ray", "POV-Ray, BSP", "Mitsuba, as is", "Mitsub
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One count, with or without shadows; milliseconds by contestant, pixels more than a level from ours by peer.
+    """One count, with or without shadows; milliseconds by contestant.
 
+    over: by contestant, the pixels more than a level from the picture of `base`, our double where we draw the scene.
     planning_ms: None where no kernel draws the scene; then `refused` says why.
     """
 
@@ -53,6 +57,7 @@ class Row:
     shadows: bool
     planning_ms: Spread | None
     milliseconds: dict[str, Spread]
+    base: str
     over: dict[str, int]
     refused: str
 
@@ -105,16 +110,18 @@ class Report:
         )
         for row in self.rows:
             shadows = "with" if row.shadows else "without"
-            for name, pixels in row.over.items():
-                if pixels:
-                    console.print(f"{row.count:,} spheres {shadows} shadows: {pixels:,} pixels > 1 level from {name}")
+            apart = ", ".join(f"{name} {pixels:,}" for name, pixels in row.over.items() if pixels)
+            if apart:
+                console.print(f"{row.count:,} spheres {shadows} shadows: pixels > 1 level from {row.base}: {apart}")
             if row.refused:
                 console.print(f"{row.count:,} spheres {shadows} shadows: not drawn by us: {row.refused}")
 
-    @staticmethod
-    def _ratio(row: Row, best: str | None, ours: str) -> str:
+    def _ratio(self, row: Row, best: str | None, ours: str) -> str:
+        """The peer's time over ours, where both drew the same picture."""
         if best is None or ours not in row.milliseconds:
             return "-"
+        if row.over[best] > OTHER_PICTURE * self.size**2 or row.over.get(ours, 0) > OTHER_PICTURE * self.size**2:
+            return "another picture"
         return f"{row.milliseconds[best].median / row.milliseconds[ours].median:.2f}"
 
 
@@ -155,7 +162,7 @@ def _row(
             for threads in sorted({1, cores()}):
                 draw = _ours(scene, size, accuracy, threads)
                 pictures[ours_name(accuracy, threads)] = draw()
-                calls[ours_name(accuracy, threads)] = _sample(draw)
+                calls[ours_name(accuracy, threads)] = warm_sample(draw)
         planning = _planning(count, seed, shadows, size)
     except OutsidePlanError as reason:
         refused = str(reason)
@@ -168,10 +175,12 @@ def _row(
         for peer, lean in ((AS_IS, False), (LEAN, True)):
             image = mitsuba.picture(scene, size, size, threads=cores(), lean=lean)
             pictures[peer] = image()
-            calls[peer] = _sample(image)
+            calls[peer] = warm_sample(image)
     samples = take_turns(calls, rounds, seed, lambda number: told(f"{name}: round {number + 1} of {rounds}"))
     times = {contestant: spread(values) for contestant, values in samples.items()}
-    return Row(count, shadows, planning, times, _over(pictures), refused)
+    base, *others = pictures or [""]
+    over = {other: _pixels_apart(pictures[base], pictures[other]) for other in others}
+    return Row(count, shadows, planning, times, base, over, refused)
 
 
 def _ours(scene: Scene, size: int, accuracy: str, threads: int) -> Callable[[], NDArray[Any]]:
@@ -197,7 +206,7 @@ def _milliseconds(call: Callable[[], object]) -> float:
     return 1e3 * (time.perf_counter() - start)
 
 
-def _sample(draw: Callable[[], object]) -> Callable[[], float]:
+def warm_sample(draw: Callable[[], object]) -> Callable[[], float]:
     """A call that times enough images for one sample, after one that is not timed, and returns milliseconds."""
     draw()
     calls = max(1, round(SHORTEST_SAMPLE / max(1e-3 * _milliseconds(draw), 1e-6)))
@@ -216,10 +225,6 @@ def _trace_milliseconds(trace: Callable[[], povray.Drawn]) -> float:
     return 1e3 * trace().trace_seconds
 
 
-def _over(pictures: dict[str, NDArray[Any]]) -> dict[str, int]:
-    """Pixels more than a level from our double (from POV-Ray where we draw nothing), by contestant."""
-    base = next(iter(pictures.values()), None)
-    if base is None:
-        return {}
-    names = list(pictures)[1:]
-    return {name: int((np.abs(pictures[name].astype(np.float64) - base) > LEVEL).sum()) for name in names}
+def _pixels_apart(one: NDArray[Any], other: NDArray[Any]) -> int:
+    """Pixels more than a level apart."""
+    return int((np.abs(one.astype(np.float64) - other) > LEVEL).sum())

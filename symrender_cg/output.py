@@ -1,12 +1,13 @@
-"""Image files: intensities -> .png, .npy or .pfm, each written whole or not at all.
+"""Image files: intensities -> .png, .npy, .npz or .pfm, each written whole or not at all.
 
-Comes in: float intensities of shape (height, width), row 0 at the top. Goes out: one file.
-Never done here: rendering, a format guessed from anything but the name, a half-written file.
+Comes in: float intensities of shape (height, width), or (height, width, 3) in colour, row 0 at the top. Goes out: one
+file. Never done here: rendering, a format guessed from anything but the name, a half-written file.
 
-    .png   grey of 8 or 16 bits; intensities are cut to [0, 1], encoded, and rounded to the nearest level
+    .png   grey or RGB of 8 or 16 bits; intensities are cut to [0, 1], encoded, and rounded to the nearest level
            srgb     the transfer curve of IEC 61966-2-1; the file says so by an sRGB chunk (and gAMA 0.45455)
            linear   levels proportional to intensity; the file says so by a gAMA chunk of 1.0
     .npy   the array itself, in its own format
+    .npz   several arrays by name, the image under `image`, not compressed
     .pfm   float32, little endian, rows from bottom to top; linear intensity
 """
 
@@ -14,9 +15,11 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -25,7 +28,7 @@ from numpy.typing import NDArray
 
 from symrender_cg.errors import ArgumentError
 
-SUFFIXES: Final = (".png", ".npy", ".pfm")
+SUFFIXES: Final = (".png", ".npy", ".npz", ".pfm")
 BITS: Final = (8, 16)
 ENCODINGS: Final = ("srgb", "linear")
 _PIXELS_A_BLOCK: Final = 1 << 18
@@ -40,6 +43,7 @@ class ImageFormat:
     suffix: str
     bits: int | None = None
     encoding: str | None = None
+    colour: bool = False
 
     @property
     def keeps_field(self) -> bool:
@@ -47,9 +51,11 @@ class ImageFormat:
         return self.bits is None
 
     def __str__(self) -> str:
+        kind = "RGB" if self.colour else "grey"
         if self.bits is not None:
-            return f"{self.bits} bit grey, {'sRGB' if self.encoding == 'srgb' else 'linear'}"
-        return "numpy array, linear" if self.suffix == ".npy" else "float32, linear"
+            return f"{self.bits} bit {kind}, {'sRGB' if self.encoding == 'srgb' else 'linear'}"
+        held = {".npy": "numpy array", ".npz": "numpy arrays", ".pfm": "float32"}[self.suffix]
+        return f"{held}, {kind}, linear" if self.colour else f"{held}, linear"
 
 
 def image_format(path: str | Path, *, bits: int | None = None, encoding: str | None = None) -> ImageFormat:
@@ -81,25 +87,42 @@ def image_format(path: str | Path, *, bits: int | None = None, encoding: str | N
 def write_image(
     path: str | Path, values: NDArray[Any], *, bits: int | None = None, encoding: str | None = None
 ) -> ImageFormat:
-    """Writes intensities (height, width) to a file in the format of its name, which is returned.
+    """Writes intensities (height, width) or (height, width, 3) to a file in the format of its name, which is returned.
 
     Raises ArgumentError for what image_format refuses, an array of another kind, intensities that are not finite in a
     .png, and a place that cannot be written. Whatever happens, the path holds the old file or the whole new one.
     """
     chosen = image_format(path, bits=bits, encoding=encoding)
-    if values.ndim != 2 or values.dtype.kind != "f" or values.size == 0:
+    if values.shape[2:] not in ((), (3,)) or values.ndim < 2 or values.dtype.kind != "f" or values.size == 0:
         raise ArgumentError(
             f"values: dtype {values.dtype} and shape {values.shape}; expected floating-point intensities of shape "
-            "(height, width), at least one pixel"
+            "(height, width) or (height, width, 3), at least one pixel"
         )
+    chosen = replace(chosen, colour=values.ndim == 3)
     if chosen.suffix == ".png":
         levels = quantise(values, chosen)
         with replacing(path) as file:
             _write_png(file, levels, chosen)
+    elif chosen.suffix == ".npz":
+        write_arrays(path, {"image": values})
     else:
         with replacing(path) as file:
             (_write_npy if chosen.suffix == ".npy" else _write_pfm)(file, values)
     return chosen
+
+
+def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Writes arrays by name to one .npz. Raises ArgumentError for a place that cannot be written."""
+    held: dict[str, Any] = dict(arrays)
+    with replacing(path) as file:
+        np.savez(file, allow_pickle=False, **held)
+
+
+def write_levels(path: str | Path, levels: NDArray[Any]) -> None:
+    """Writes a .png of grey or RGB levels, uint8 or uint16, that are what a screen shall show: no curve is applied."""
+    bits = 8 * levels.itemsize
+    with replacing(path) as file:
+        _write_png(file, levels, ImageFormat(".png", bits, "srgb", levels.ndim == 3))
 
 
 def srgb(intensity: NDArray[Any]) -> NDArray[Any]:
@@ -115,15 +138,16 @@ def quantise(values: NDArray[Any], form: ImageFormat) -> NDArray[Any]:
     """
     assert form.bits is not None, "levels are of a .png"
     white = 2**form.bits - 1
-    height, width = values.shape
+    height, width = values.shape[:2]
     levels = np.empty(values.shape, np.uint8 if form.bits == 8 else np.uint16)
     rows = max(1, _PIXELS_A_BLOCK // width)
     for begin in range(0, height, rows):
         block = values[begin : begin + rows].astype(np.float64)
         if not np.isfinite(block).all():
-            row, column = (int(index) for index in np.argwhere(~np.isfinite(block))[0])
+            row, *rest = (int(index) for index in np.argwhere(~np.isfinite(block))[0])
+            place = ", ".join(map(str, (begin + row, *rest)))
             raise ArgumentError(
-                f"values[{begin + row}, {column}]: {block[row, column]} has no grey level; write a .npy or .pfm to see "
+                f"values[{place}]: {block[(row, *rest)]} has no grey level; write a .npy or .pfm to see "
                 "such intensities"
             )
         block = np.clip(block, 0.0, 1.0, out=block)
@@ -156,14 +180,43 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
 
 
 def _write_png(file: BinaryIO, levels: NDArray[Any], form: ImageFormat) -> None:
+    assert form.encoding is not None, "a .png has an encoding"
+    chunks = [(b"gAMA", _GAMMA[form.encoding].to_bytes(4, "big"))]
+    if form.encoding == "srgb":
+        chunks.append(_SRGB_CHUNK)
+    if form.colour and form.bits == 16:
+        _write_deep_rgb(file, levels, chunks)
+        return
     from PIL import Image, PngImagePlugin
 
-    chunks = PngImagePlugin.PngInfo()
-    assert form.encoding is not None, "a .png has an encoding"
-    chunks.add(b"gAMA", _GAMMA[form.encoding].to_bytes(4, "big"))
-    if form.encoding == "srgb":
-        chunks.add(*_SRGB_CHUNK)
-    Image.fromarray(levels).save(file, format="PNG", pnginfo=chunks)
+    info = PngImagePlugin.PngInfo()
+    for chunk in chunks:
+        info.add(*chunk)
+    Image.fromarray(levels).save(file, format="PNG", pnginfo=info)
+
+
+def _write_deep_rgb(file: BinaryIO, levels: NDArray[Any], chunks: list[tuple[bytes, bytes]]) -> None:
+    """PNG of colour type 2 and 16 bits, which pillow does not write; each row as its difference from the one above."""
+    height, width = levels.shape[:2]
+
+    def chunk(name: bytes, data: bytes) -> None:
+        file.write(struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)))
+
+    file.write(b"\x89PNG\r\n\x1a\n")
+    chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 2, 0, 0, 0))
+    for name, data in chunks:
+        chunk(name, data)
+    packed = zlib.compressobj()
+    above = np.zeros(6 * width, np.uint8)
+    for begin in range(0, height, rows := max(1, _PIXELS_A_BLOCK // width)):
+        block = np.ascontiguousarray(levels[begin : begin + rows], dtype=">u2").view(np.uint8).reshape(-1, 6 * width)
+        up = np.full((len(block), 1 + 6 * width), 2, np.uint8)  # the filter "up" of every row
+        up[:, 1:] = block - np.vstack((above, block[:-1]))
+        above = block[-1]
+        if data := packed.compress(up.tobytes()):
+            chunk(b"IDAT", data)
+    chunk(b"IDAT", packed.flush())
+    chunk(b"IEND", b"")
 
 
 def _write_npy(file: BinaryIO, values: NDArray[Any]) -> None:
@@ -171,7 +224,7 @@ def _write_npy(file: BinaryIO, values: NDArray[Any]) -> None:
 
 
 def _write_pfm(file: BinaryIO, values: NDArray[Any]) -> None:
-    height, width = values.shape
-    file.write(f"Pf\n{width} {height}\n-1.0\n".encode())
+    height, width = values.shape[:2]
+    file.write(f"{'Pf' if values.ndim == 2 else 'PF'}\n{width} {height}\n-1.0\n".encode())
     with np.errstate(over="ignore"):
         file.write(np.ascontiguousarray(values[::-1], dtype="<f4").tobytes())

@@ -152,9 +152,7 @@ def pixel_size(frame: Scene, height: int) -> float:
     return 2.0 * half_height / height
 
 
-def planned(
-    scene: Scene, *, force: tuple[str, ...] = (), aspect: float | None = None, max_error: float = 0.0
-) -> Plan:
+def planned(scene: Scene, *, force: tuple[str, ...] = (), aspect: float | None = None, max_error: float = 0.0) -> Plan:
     """The plan of a scene, remembered: a scene is drawn more than once."""
     found = _planned(scene, force, aspect, max_error)
     with _guard:

@@ -173,7 +173,7 @@ def _shaded(
         light = world.frame.lights[found.lamp_light[lamp]]
         strength = np.ones(count)
         if isinstance(light, PointLight):
-            w = sum(from_to(base, offset, np.array(light.position) / world.scale))
+            w = _from(base, offset, np.array(light.position) / world.scale)
             distance = length(w)
             l_hat, far = w / distance, distance * world.scale
             a, b, c = light.attenuation
@@ -205,6 +205,12 @@ def _shaded(
     return value
 
 
+def _from(base: Floats, offset: Floats, target: Floats) -> Floats:
+    """target - (base + offset)"""
+    first, rest = from_to(base, offset, target)
+    return np.asarray(first + rest)
+
+
 def _visible(
     world: World,
     found: Arrangement,
@@ -220,7 +226,7 @@ def _visible(
     for k in found.blockers[found.blockers_begin[lamp] : found.blockers_begin[lamp + 1]]:
         index = int(found.spheres[k])
         radius = world.radii[index]
-        m = sum(from_to(base, offset, world.centers[index]))
+        m = _from(base, offset, world.centers[index])
         c, along = np.cross(m, l_hat, axis=0), dot(m, l_hat)
         reaches: Any = along < distance
         if isinstance(light, PointLight):

@@ -273,7 +273,7 @@ def contexts(monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[str, Any]]:
 
 def asked_for(name: str) -> set[str]:
     """Keys that a template reads and does not define itself."""
-    tree = c99._environment().parse((templates() / name).read_text(encoding="utf-8"))
+    tree = c99.environment().parse((templates() / name).read_text(encoding="utf-8"))
     own = {macro.name for macro in tree.find_all(jinja2.nodes.Macro)}
     own |= {
         entry.target.name for entry in tree.find_all(jinja2.nodes.Assign) if isinstance(entry.target, jinja2.nodes.Name)
@@ -288,7 +288,7 @@ def test_a_template_that_lacks_a_key_fails(contexts: dict[str, dict[str, Any]], 
         smaller = {other: value for other, value in context.items() if other != key}
         assert key in asked_for(name)
         with pytest.raises(jinja2.UndefinedError, match=key):
-            c99._environment().get_template(name).render(smaller)
+            c99.environment().get_template(name).render(smaller)
 
 
 def test_every_key_given_to_the_templates_is_used_by_one(contexts: dict[str, dict[str, Any]]) -> None:

@@ -16,7 +16,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from benchmarks import povray, strips
+from benchmarks import povray, povray_text, strips
 from benchmarks.agreement import statable
 from symrender_cg import Camera, Phong, PointLight, Scene, Sphere
 from symrender_cg.reference import brute_force
@@ -75,7 +75,7 @@ def seen_colours(text: str, name: str) -> tuple[np.ndarray, np.ndarray, float]:
 
 def test_rays_of_the_exported_camera_go_through_our_pixel_centres() -> None:
     width, height = 7, 4
-    text = povray.export(SCENE, width, height)
+    text = povray_text.export(SCENE, width, height)
     camera, unit = lines_of(text, "camera")[0], unit_of(text)
     location, direction, right, up = (
         np.array(after(camera, word)) / unit for word in ("location", "direction", "right", "up")
@@ -99,7 +99,7 @@ def test_spheres_are_those_of_the_camera_frame_times_one_power_of_two(
 ) -> None:
     assume(math.dist(center, (0, 0, eye)) > radius)
     scene = Scene(Camera((0.0, 0.0, eye), half_height=1.0), (Sphere(center, radius, MATERIAL),))
-    text = povray.export(scene, 8, 8)
+    text = povray_text.export(scene, 8, 8)
     unit, line = unit_of(text), lines_of(text, "sphere")[0]
     assert math.frexp(unit)[0] == 0.5
     assert tuple(c / unit for c in numbers(line)) == center
@@ -108,7 +108,7 @@ def test_spheres_are_those_of_the_camera_frame_times_one_power_of_two(
 
 def test_a_scene_is_exported_as_it_is_in_the_camera_frame() -> None:
     moved = replace(SCENE, camera=Camera((3.0, 1.0, 5.0), (0.25, 0.0, 0.0), (0.1, 1.0, 0.0)))
-    assert povray.export(moved, 9, 5) == povray.export(moved.in_camera_frame(), 9, 5)
+    assert povray_text.export(moved, 9, 5) == povray_text.export(moved.in_camera_frame(), 9, 5)
 
 
 @given(*[st.one_of(st.just(0.0), st.floats(1e-3, 10.0))] * 3)
@@ -121,15 +121,15 @@ def test_fades_add_up_to_the_attenuation(a: float, b: float, c: float) -> None:
     for length in (0.01, 0.7, 1.0, 3.0, 50.0):
         total = sum(
             share * (2.0 / (1.0 + (length / distance) ** power) if power else 1.0)
-            for share, distance, power in povray.fades((a, b, c))
+            for share, distance, power in povray_text.fades((a, b, c))
         )
         assert total == pytest.approx(1.0 / (a + b * length + c * length * length), rel=2e-6)
 
 
 @pytest.mark.parametrize("attenuation", [(1.0, 0.1, 0.1), (1.0, 2.0, 1.0), (0.5, 0.0625, 0.03125)])
 def test_an_attenuation_without_a_form_is_refused_by_its_numbers(attenuation: tuple[float, float, float]) -> None:
-    with pytest.raises(povray.NotStatedError, match=re.escape(str(attenuation))):
-        povray.fades(attenuation)
+    with pytest.raises(povray_text.NotStatedError, match=re.escape(str(attenuation))):
+        povray_text.fades(attenuation)
 
 
 def test_a_scene_that_cannot_be_stated_is_replaced_by_one_that_can_and_the_change_is_told() -> None:
@@ -144,7 +144,7 @@ def test_a_scene_that_cannot_be_stated_is_replaced_by_one_that_can_and_the_chang
 
 
 def test_lights_stand_where_they_are_and_parallel_ones_shine_along_their_direction() -> None:
-    text = povray.export(SCENE, 8, 8)
+    text = povray_text.export(SCENE, 8, 8)
     point, sun = lines_of(text, "light_source")
     assert [c / unit_of(text) for c in numbers(point)] == [5.0, 5.0, 10.0]
     assert after(point, "rgb") == [0.75, 0.75, 0.75]
@@ -156,7 +156,7 @@ def test_lights_stand_where_they_are_and_parallel_ones_shine_along_their_directi
 
 def test_a_light_of_intensity_0_is_not_exported() -> None:
     dark = replace(SCENE, lights=(PointLight((1.0, 1.0, 5.0), 0.0),))
-    assert "light_source" not in povray.export(dark, 8, 8)
+    assert "light_source" not in povray_text.export(dark, 8, 8)
 
 
 @given(colours, colours, unit_numbers)
@@ -165,9 +165,9 @@ def test_pigment_and_finish_multiply_to_the_coefficients(
 ) -> None:
     material = Phong(ambient, diffuse, specular, 20.5, True)
     scene = replace(SCENE, spheres=(Sphere(material=material),), plane=None)
-    pictures = povray.channels(scene)
+    pictures = povray_text.channels(scene)
     for channel in pictures:
-        text = povray.export(scene, 8, 8, channel=channel)
+        text = povray_text.export(scene, 8, 8, channel=channel)
         expected = [np.broadcast_to(np.array(c), 3) for c in (ambient, diffuse)]
         if channel is not None:
             expected = [np.repeat(c[channel], 3) for c in expected]
@@ -181,10 +181,10 @@ def test_pigment_and_finish_multiply_to_the_coefficients(
 def test_coloured_highlights_take_three_pictures_each_of_its_own_channel() -> None:
     material = Phong((0.1, 0.2, 0.3), 0.5, (0.25, 0.5, 0.75), gate_specular=True)
     scene = replace(SCENE, spheres=(Sphere(material=material),))
-    assert povray.channels(SCENE) == (None,)
-    assert povray.channels(scene) == (0, 1, 2)
+    assert povray_text.channels(SCENE) == (None,)
+    assert povray_text.channels(scene) == (0, 1, 2)
     for channel in (0, 1, 2):
-        text = povray.export(scene, 8, 8, channel=channel)
+        text = povray_text.export(scene, 8, 8, channel=channel)
         assert seen_colours(text, "Material_0")[2] == (0.25, 0.5, 0.75)[channel]
         assert after(lines_of(text, "background")[0], "rgb") == [(0.0625, 0.125, 0.25)[channel]] * 3
         assert after(lines_of(text, "light_source")[1], "rgb") == [(0.125, 0.25, 0.5)[channel]] * 3
@@ -193,7 +193,7 @@ def test_coloured_highlights_take_three_pictures_each_of_its_own_channel() -> No
 def test_without_shadows_no_object_casts_one_and_with_them_every_object_does() -> None:
     bodies = ("sphere", "plane")
     for shadows in (True, False):
-        text = povray.export(replace(SCENE, shadows=shadows), 8, 8)
+        text = povray_text.export(replace(SCENE, shadows=shadows), 8, 8)
         objects = [line for body in bodies for line in lines_of(text, f"{body} {{")]
         assert len(objects) == 3
         assert all(("no_shadow" in line) != shadows for line in objects)
@@ -202,7 +202,7 @@ def test_without_shadows_no_object_casts_one_and_with_them_every_object_does() -
 
 @pytest.mark.parametrize("bounces", [0, 1, 4, 16])
 def test_the_trace_level_is_one_more_than_the_bounces(bounces: int) -> None:
-    text = povray.export(replace(SCENE, max_bounces=bounces), 8, 8)
+    text = povray_text.export(replace(SCENE, max_bounces=bounces), 8, 8)
     assert scalar(text, "max_trace_level") == bounces + 1
     assert scalar(text, "adc_bailout") == 0.0
     assert ("reflection { rgb 0.25 }" in text) == (bounces > 0)
@@ -210,7 +210,7 @@ def test_the_trace_level_is_one_more_than_the_bounces(bounces: int) -> None:
 
 
 def test_gain_multiplies_lights_ambient_and_background_and_nothing_else() -> None:
-    full, half = povray.export(SCENE, 8, 8), povray.export(SCENE, 8, 8, gain=0.5)
+    full, half = povray_text.export(SCENE, 8, 8), povray_text.export(SCENE, 8, 8, gain=0.5)
     for plain, dark in zip(full.splitlines(), half.splitlines(), strict=True):
         if plain.startswith("//"):
             continue
@@ -235,7 +235,7 @@ def test_the_tile_of_the_exported_pattern_is_that_of_the_plane(along: float, acr
     assume(min(abs(t - round(t)) for t in tiles) > 1e-9)
     point = np.array(plane.point) + along * u + across * v
 
-    text = povray.export(SCENE, 8, 8)
+    text = povray_text.export(SCENE, 8, 8)
     line = lines_of(text, "plane {")[0]
     rows = np.array(after(line, "matrix")).reshape(4, 3)
     pattern = np.linalg.solve(rows[:3].T, unit_of(text) * point - rows[3])
@@ -249,7 +249,7 @@ def test_the_tile_of_the_exported_pattern_is_that_of_the_plane(along: float, acr
 @pytest.mark.parametrize("up", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (-3.0, 0.5, 2.0), (0.0, -1.0, 0.0)])
 def test_the_sky_has_the_gradients_colour_in_every_direction(up: tuple[float, float, float]) -> None:
     sky = Gradient((0.0, 0.25, 0.5), (1.0, 0.5, 0.25), up)
-    line = lines_of(povray.export(replace(SCENE, background=sky), 8, 8), "sky_sphere")[0]
+    line = lines_of(povray_text.export(replace(SCENE, background=sky), 8, 8), "sky_sphere")[0]
     rows = np.array(after(line, "matrix")).reshape(4, 3)
     scale, shift = scalar(line, "scale"), np.array(after(line, "translate"))
     entries = re.findall(rf"\[({NUMBER}) rgb <([^>]*)>\]", line)
@@ -266,7 +266,7 @@ def test_the_sky_has_the_gradients_colour_in_every_direction(up: tuple[float, fl
 
 def test_equal_materials_are_declared_once() -> None:
     spheres = tuple(Sphere((float(k), 0.0, 0.0), 0.25, MATERIAL) for k in range(5))
-    text = povray.export(replace(SCENE, spheres=spheres, plane=None), 8, 8)
+    text = povray_text.export(replace(SCENE, spheres=spheres, plane=None), 8, 8)
     assert len(lines_of(text, "#declare")) == 1
     assert text.count("texture { Material_0 }") == 5
 

@@ -279,7 +279,7 @@ def test_after_the_last_pass_a_program_is_frozen_placed_and_without_dead_steps(n
 def rate_of(program: KernelProgram, name: str) -> int:
     if name in program:
         return RATES.index(program[name].rate)
-    return {"x": 2, "y": 1}.get(name, 0)
+    return program.input_rates().get(name, 0)
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)

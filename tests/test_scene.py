@@ -177,6 +177,7 @@ def test_equal_scenes_have_equal_hashes_and_the_same_bits() -> None:
     assert hash(one) == hash(two)
     assert repr(one) == repr(two)
     assert len({one, two, Scene()}) == 2
+    assert repr(Sphere((-0.0, -1.0, -0.0)).center) == "(0.0, -1.0, 0.0)"
 
 
 @given(st.one_of(ordinary_scenes(), nasty_scenes(), scenes()))
@@ -449,6 +450,13 @@ def test_first_sphere_that_the_eye_is_not_outside_is_found_exactly(
     eye = scaled_point(eye, k)
     expected = [i for i, s in enumerate(spheres) if excess_over_sphere(eye, s.center, s.radius) <= 0]
     assert first_not_outside(eye, spheres) == (expected[0] if expected else None)
+
+
+def test_eye_inside_a_sphere_whose_square_rounds_below_the_eye_s_is_found() -> None:
+    """In units of 2^-1074 the true squares are 1.8 and 2.2; in float64 they are 3 and 2."""
+    a, radius = math.ldexp(math.sqrt(0.6), -537), math.ldexp(math.sqrt(2.2), -537)
+    assert radius * radius < a * a + a * a + a * a
+    assert first_not_outside((a, a, a), [Sphere((0, 0, 0), radius)]) == 0
 
 
 def scaled_point(v: Vector, k: int) -> Vector:

@@ -11,6 +11,7 @@ from symrender_cg.lower.variants import ACCURACIES
 from symrender_cg.version import VERSION
 
 LARGEST_SIDE = 1 << 24
+LAYERS = ("depth", "normal", "index", "background", "ambient", "reflected", "diffuse", "specular")
 SCENE_HELP = "a built-in scene's name or a TOML file; Chapter 1's scene if left out (render --list names the others)"
 
 _DESCRIPTION = """\
@@ -50,14 +51,24 @@ Renders a scene to an image file; its extension chooses the format.
            --encoding srgb (default): the transfer curve of IEC 61966-2-1, declared by an sRGB chunk in the file
            --encoding linear: grey levels proportional to intensity, declared by a gAMA chunk of 1.0
     .npy   the array of linear intensities, float64 (float32 with --accuracy single)
+    .npz   the same under the name `image`, with every layer that --layers names
     .pfm   linear intensities as float32, little endian, rows from bottom to top
 
-The file is written whole or not at all."""
+A scene with a colour anywhere is written as RGB. --layers writes what else the kernel knows of each pixel beside the
+image, out-depth.png, out-normal.png, ...:
+
+    depth    distance from the eye; as a .png near is white, far is dark, the background black
+    normal   in the camera's frame; as a .png (n + 1) / 2
+    index    which sphere, then the plane; as a .png a colour each
+    terms    background, ambient, diffuse and specular of each light, reflected: they add up to the image
+
+Every file is written whole or not at all."""
 _RENDER_EXAMPLES = """\
 examples:
   python -m symrender_cg render -o sphere.png
   python -m symrender_cg render scene.toml -o out.png --size 1920x1080 --bits 16 --encoding linear
   python -m symrender_cg render off_axis -o field.npy --no-clip
+  python -m symrender_cg render mirrors -o out.png --layers depth,normal,index,terms
   python -m symrender_cg render --list
 """
 
@@ -148,15 +159,22 @@ def _add_build(commands: argparse._SubParsersAction[Parser]) -> None:
 
 
 def _add_render(commands: argparse._SubParsersAction[Parser]) -> None:
-    parser = _command(commands, "render", "render a scene to .png, .npy or .pfm", _RENDER, _RENDER_EXAMPLES)
+    parser = _command(commands, "render", "render a scene to .png, .npy, .npz or .pfm", _RENDER, _RENDER_EXAMPLES)
     parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
-    parser.add_argument("-o", "--output", metavar="FILE", help="the image file: .png, .npy or .pfm")
+    parser.add_argument("-o", "--output", metavar="FILE", help="the image file: .png, .npy, .npz or .pfm")
     _size(parser, (512, 512))
     _accuracy(parser)
     parser.add_argument("--threads", type=int, metavar="N", help="threads (default: by size; any number, same bits)")
     parser.add_argument("--bits", type=int, choices=(8, 16), help="of a .png (default: 8)")
     parser.add_argument("--encoding", choices=("srgb", "linear"), help="of a .png (default: srgb)")
-    parser.add_argument("--no-clip", action="store_true", help="keep intensities above 1; .npy and .pfm only")
+    parser.add_argument("--no-clip", action="store_true", help="keep intensities above 1; not in a .png")
+    parser.add_argument(
+        "--layers",
+        type=layer_list,
+        default=(),
+        metavar="L[,L]",
+        help=f"some of {', '.join(LAYERS)}, terms (the last five), all; with commas",
+    )
     _portable(parser)
     parser.add_argument(
         "--backend", choices=("native", "numpy"), default="native", help="numpy needs no compiler and is slower"
@@ -247,6 +265,15 @@ def accuracy_list(text: str) -> tuple[str, ...] | str:
             f"{unknown[0]!r} is not known; expected some of {', '.join(ACCURACIES)}, or all"
         )
     return "all" if "all" in names else tuple(name for name in ACCURACIES if name in names)
+
+
+def layer_list(text: str) -> tuple[str, ...]:
+    """`depth,terms` -> those names, each once. Raises ArgumentTypeError for an unknown one."""
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
+    choices = (*LAYERS, "terms", "all")
+    if unknown := [name for name in names if name not in choices]:
+        raise argparse.ArgumentTypeError(f"{unknown[0]!r} is not known; expected some of {', '.join(choices)}")
+    return names
 
 
 def _count(text: str) -> int:

@@ -1,15 +1,14 @@
-"""A quick measurement of one kernel, enough to say what baking saved. Benchmarks are elsewhere."""
+"""Quick measurements of drawings, side by side: enough to say what baking or an effect costs. Benchmarks are elsewhere."""
 
 from __future__ import annotations
 
-import math
 import time
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from symrender_cg.pipeline import compile_kernel
-from symrender_cg.run.numbers import numbers_of
-from symrender_cg.run.render import pixel_size
+from symrender_cg.pipeline import draw
+from symrender_cg.run.drawing import Drawing
 from symrender_cg.scene import Scene
 
 SIDE = 256
@@ -18,13 +17,25 @@ ROUNDS = 15
 
 def nanoseconds_a_pixel(scene: Scene, accuracy: str, *, bake: bool, portable: bool) -> float:
     """The median time of rendering 256 x 256 pixels on one thread, a pixel, in nanoseconds."""
-    kernel = compile_kernel(scene, accuracy, bake=bake, portable=portable)
-    frame = scene.in_camera_frame()
-    image = np.empty((SIDE, SIDE), kernel.dtype)
-    numbers = kernel.numbers(numbers_of(frame))
-    times = []
-    for _ in range(ROUNDS):
-        begin = time.perf_counter()
-        kernel.rows(image, numbers, pixel=pixel_size(frame, SIDE), white=math.inf, begin=0, end=SIDE)
-        times.append(time.perf_counter() - begin)
-    return sorted(times)[ROUNDS // 2] / (SIDE * SIDE) * 1e9
+    drawing = draw(scene, accuracy, size=(SIDE, SIDE), bake=bake, portable=portable)
+    (median,) = interleaved_medians([drawing], (SIDE, SIDE), rounds=ROUNDS)
+    return median / (SIDE * SIDE) * 1e9
+
+
+def interleaved_medians(
+    drawings: Sequence[Drawing], size: tuple[int, int], *, rounds: int, done: Callable[[], None] = lambda: None
+) -> list[float]:
+    """Median seconds of one image of width x height on one thread, each drawing once a round, in turn.
+
+    `done` is called after every round.
+    """
+    width, height = size
+    images = [np.empty(drawing.shape(height, width), drawing.dtype) for drawing in drawings]
+    times: list[list[float]] = [[] for _ in drawings]
+    for _ in range(rounds):
+        for drawing, image, spent in zip(drawings, images, times, strict=True):
+            begin = time.perf_counter()
+            drawing.rows(image, 0, height)
+            spent.append(time.perf_counter() - begin)
+        done()
+    return [sorted(spent)[len(spent) // 2] for spent in times]

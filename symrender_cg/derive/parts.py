@@ -79,7 +79,9 @@ def _vector(
     return x, y, z
 
 
-def _cut(definitions: tuple[Definition, ...], results: tuple[str, ...], given: tuple[str, ...] = ()) -> tuple[Definition, ...]:
+def _cut(
+    definitions: tuple[Definition, ...], results: tuple[str, ...], given: tuple[str, ...] = ()
+) -> tuple[Definition, ...]:
     """The definitions that lead to the results, in their order; what is given is not looked into."""
     needed = set(results)
     kept: list[Definition] = []
@@ -103,7 +105,10 @@ _PRIMARY = (*_SPHERE, ("y", "row"), ("x", "pixel"))
 
 
 def sphere_part(*, near: bool, mirrored: bool) -> Part:
-    """A sphere seen by the eye; `near`: it reaches the eye's plane, so each pixel is tested. `mirrored`: with d mirrored."""
+    """A sphere seen by the eye; `near`: it reaches the plane of the eye, so each pixel is tested.
+
+    `mirrored`: with the eye's ray mirrored at it.
+    """
     section = "distance"
     x, y, focal = symbols("x y focal")
     offset_x, offset_y, depth = symbols("offset_x offset_y depth")
@@ -137,12 +142,46 @@ def sphere_part(*, near: bool, mirrored: bool) -> Part:
                 "the rows that meet the silhouette: row_disc = 0",
             ),
             Definition("row_high", focal * (depth * offset_y + half) / S("height2"), silhouette),
+            *_outline(),
         ]
-    results = ("facing2", "d_dot_d", "n_x", "n_y", "n_z", "hit_distance")
-    results += ("before_eye",) if near else ("x_left", "x_right", "row_low", "row_high")
+    results: tuple[str, ...] = ("facing2", "d_dot_d", "n_x", "n_y", "n_z", "hit_distance")
+    results += ("before_eye",) if near else ("x_left", "x_right", "row_low", "row_high", *OUTLINE)
     results += ("mirror_x", "mirror_y", "mirror_z", "inv_d2") if mirrored else ()
     definitions = _cut((*program.definitions, *more), results)
-    return Part("near" if near else "span", definitions, results, _PRIMARY, ends=None if near else ("x_left", "x_right"))
+    return Part(
+        "near" if near else "span", definitions, results, _PRIMARY, ends=None if near else ("x_left", "x_right")
+    )
+
+
+OUTLINE = ("outline_left", "outline_right")
+"""Ends of a row's span with room for the rounding of plain float64: no hit lies outside them."""
+
+_ROOM = sp.Rational(1, 2**48)
+
+
+def _outline() -> tuple[Definition, ...]:
+    """The span's ends as x_left and x_right, each difference widened by 2^-48 of what it is the difference of."""
+    section = "outline"
+    y, focal, depth, alpha = symbols("y focal depth alpha")
+    offset_x, offset_y = symbols("offset_x offset_y")
+    gap = depth * y - offset_y * focal
+    middle = offset_x * (depth * focal + offset_y * y)
+    farthest = sp.Abs(offset_x) * (depth * focal + sp.Abs(offset_y) * sp.Abs(y))
+    return (
+        Definition("gap_room", _ROOM * (depth * sp.Abs(y) + sp.Abs(offset_y) * focal), section, "what rounding may do"),
+        Definition("plain_gap", sp.Abs(gap), section, "|row_gap| in plain float64"),
+        Definition("less_gap", S("plain_gap") - S("gap_room"), section),
+        Definition("least_gap", sp.Max(0, S("less_gap")), section, "at most |row_gap|"),
+        Definition("most_disc", (1 + _ROOM) * (y**2 + focal**2) - S("least_gap") ** 2, section, "at least row_disc"),
+        Definition(
+            "most_half",
+            (1 + _ROOM) * sp.sqrt((alpha + offset_x**2) * sp.Max(0, S("most_disc"))) + _ROOM * farthest,
+            section,
+            "at least row_half, and the rounding of the middle",
+        ),
+        Definition("outline_left", (middle - S("most_half")) / alpha, section, "every hit lies between these"),
+        Definition("outline_right", (middle + S("most_half")) / alpha, section),
+    )
 
 
 def lamp_part() -> Part:
@@ -207,7 +246,12 @@ def shadow_part(point: str) -> Part:
         *_vector("b", vector("gap") - vector(point), section, "b, the blocker's centre seen from the point"),
         *_vector("cross", b.cross(w), section, "b x w", LAGRANGE),
         Definition("toward", b.dot(w), section, "b.w"),
-        Definition("inside2", S("ratio2") * S("w2") - cross.dot(cross), section, "positive where the line to the light meets the blocker"),
+        Definition(
+            "inside2",
+            S("ratio2") * S("w2") - cross.dot(cross),
+            section,
+            "positive where the line to the light meets the blocker",
+        ),
         Definition(
             "shade",
             sp.Piecewise(
@@ -241,7 +285,7 @@ def plane_part(*, mirrored: bool) -> Part:
         Definition("hit_distance", sp.sqrt(S("d_dot_d")) / S("descent"), section, "|P - E|"),
     ]
     definitions += _vector("n", normal, section, "its normal, towards the eye")
-    results = ("descent", *_xyz("p"), *_xyz("n"), "hit_distance")
+    results: tuple[str, ...] = ("descent", *_xyz("p"), *_xyz("n"), "hit_distance")
     if mirrored:
         definitions += [
             Definition("inv_d2", 1 / S("d_dot_d"), section),
@@ -249,7 +293,9 @@ def plane_part(*, mirrored: bool) -> Part:
             *_vector("mirror", ray + S("bounce") * normal, section, "the ray mirrored at the plane"),
         ]
         results += ("inv_d2", *_xyz("mirror"))
-    return Part("plane", tuple(definitions), results, (*((n, "frame") for n, _ in _PLANE), ("y", "row"), ("x", "pixel")))
+    return Part(
+        "plane", tuple(definitions), results, (*((n, "frame") for n, _ in _PLANE), ("y", "row"), ("x", "pixel"))
+    )
 
 
 def tiles_part() -> Part:
@@ -273,7 +319,9 @@ def echo_part(point: str) -> Part:
     section = "mirrored ray and sphere"
     m, ray, cross = vector("m"), vector("mirror"), vector("cross")
     definitions = (
-        *_vector("m", vector("link") - S("shrink") * vector(point), section, "m, the centre seen from the point, in radii"),
+        *_vector(
+            "m", vector("link") - S("shrink") * vector(point), section, "m, the centre seen from the point, in radii"
+        ),
         *_vector("cross", m.cross(ray), section, "m x d, with d the mirrored ray", LAGRANGE),
         Definition("d2", ray.dot(ray), section, "|d|^2"),
         Definition("disc", S("d2") - cross.dot(cross), section, "disc / R^2: a hit where >= 0 and m.d > 0"),
@@ -305,7 +353,10 @@ def arrival_part(point: str) -> Part:
 
 
 def echo_plane_part(point: str) -> Part:
-    """A mirrored ray and the plane, in heights of the eye above it: o = origin + scale p is the point seen from the eye."""
+    """A mirrored ray and the plane, in heights of the eye above it.
+
+    o = origin + scale p is the point that mirrors, seen from the eye.
+    """
     section = "mirrored ray and plane"
     start, ray, normal = vector("o"), vector("mirror"), vector("plane")
     definitions = (
@@ -332,7 +383,9 @@ def gradient_part() -> Part:
     """s = (1 + up.D / |D|) / 2 of a direction: 0 straight down, 1 straight up."""
     direction, up = vector("d"), vector("up")
     definitions = (
-        Definition("climb", up.dot(direction) / sp.sqrt(direction.dot(direction)), "background", "sine of the elevation"),
+        Definition(
+            "climb", up.dot(direction) / sp.sqrt(direction.dot(direction)), "background", "sine of the elevation"
+        ),
         Definition("height", sp.Rational(1, 2) + S("climb") / 2, "background", "0 straight down, 1 straight up"),
     )
     rates = (*((f"up_{axis}", "frame") for axis in "xyz"), *_of_points("d"))

@@ -27,10 +27,14 @@ class Carried:
 
 
 class PrimaryBodies:
-    """A part that takes the eye's ray: structures for frame, sphere and row, and bodies for what a pixel needs."""
+    """A part that takes the eye's ray: structures for frame, sphere and row, and bodies for what a pixel needs.
 
-    def __init__(self, program: KernelProgram, stored: Sequence[str]) -> None:
+    Results `apart` are a row's too, but have a function of their own.
+    """
+
+    def __init__(self, program: KernelProgram, stored: Sequence[str], apart: Sequence[str] = ()) -> None:
         self.program = program
+        self.apart = frozenset(apart)
         self.name = program.name
         self.format = {step.name: step.format for step in program.steps}
         rates = program.input_rates()
@@ -47,6 +51,10 @@ class PrimaryBodies:
     def pixel(self, names: Iterable[str], indent: str = INDENT) -> list[str]:
         """The statements at the rate of a pixel that lead to the named quantities."""
         return body(closure(self.program.at("pixel"), names), self._places("pixel"), indent)
+
+    def outline(self) -> list[str]:
+        """The statements at the rate of a row that lead to the results apart."""
+        return body(closure(self.program.at("row"), self.apart), self._places("row"))
 
     def sight(self) -> list[str]:
         """The statements that tell how surely a ray hits."""
@@ -65,7 +73,9 @@ class PrimaryBodies:
     def _carried(self, rate: Rate) -> Carried:
         steps = self.program.at(rate)
         faster = [step for r in _faster(rate) for step in self.program.at(r)]
-        used = {name for step in faster for name in step.uses()} | set(self.program.outputs)
+        used = {name for step in faster for name in step.uses()} | (set(self.program.outputs) - self.apart)
+        if rate == "row":
+            steps = closure(steps, used)
         fields = [(str(C_TYPES[step.format].name), step.name) for step in steps if step.name in used]
         fields += [("double", name) for name, of in self.inputs.items() if of == rate and name in used]
         if rate == "row" and any("y" in step.uses() for step in self.program.at("pixel")):
@@ -83,9 +93,7 @@ class PrimaryBodies:
     def _places(self, rate: Rate) -> dict[str, str]:
         """Where each name lives for the statements of a rate."""
         places = {
-            name: ("scene->{}[k]" if of == "sphere" else "scene->{}")
-            if of == rate
-            else f"{_CARRIERS[of]}->{{}}"
+            name: ("scene->{}[k]" if of == "sphere" else "scene->{}") if of == rate else f"{_CARRIERS[of]}->{{}}"
             for name, of in self.inputs.items()
             if of == rate or of in _slower(rate)
         }

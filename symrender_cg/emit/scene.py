@@ -6,7 +6,6 @@ points, and contains no mathematics of the image. What the plan leaves out leave
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,7 +18,7 @@ from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test
 from symrender_cg.emit.parts import PrimaryBodies
 from symrender_cg.emit.scene_fields import Needs, scene_fields
 from symrender_cg.lower.nodes import Call, walk
-from symrender_cg.lower.program import KernelProgram
+from symrender_cg.lower.program import RATES, KernelProgram
 from symrender_cg.lower.variants import Variant
 from symrender_cg.plan.plan import Plan
 from symrender_cg.resources import template_path
@@ -46,11 +45,13 @@ class Primary:
     sign_tests: tuple[dict[str, object], ...]
     distance: list[str]
     sight: list[str]
+    outline: list[str]
     stores: list[str]
     void_row: str
     void_distance: str
     void_sight: str
     void_surface: str
+    void_outline: str
 
 
 def scene_parts(need: Needs) -> dict[str, Part]:
@@ -107,6 +108,10 @@ def emit_scene(
         *(["scene->partners_begin[k + 1] > scene->partners_begin[k]"] if need.intersections else []),
         *(["scene->crosses_plane[k]"] if need.crossing else []),
     ]
+    spared = [
+        *(["!scene->at_eye[k]"] if need.at_eye else []),
+        *(["scene->partners_begin[k + 1] == scene->partners_begin[k]"] if need.intersections else []),
+    ]
     context = {
         "name": name,
         "version": VERSION,
@@ -129,6 +134,7 @@ def emit_scene(
         "near": need.at_eye,
         "contested": need.spheres and (need.intersections or need.crossing),
         "contest": " || ".join(contest),
+        "left_test": "".join(f"{condition} && " for condition in spared),
         "mirrored_spheres": need.mirrors,
         "primaries": primaries,
         "fields": fields,
@@ -146,9 +152,9 @@ def emit_scene(
     files = {f"{name}.c": source, f"{name}.h": header}
     carried = ("grid.h", *includes, *(("power.h",) if "phong_power.h" in includes else ()))
     files |= {h: template_path(f"support/{h}").read_text(encoding="utf-8") for h in carried}
-    total = {
-        rate: dict(sum((operations(program.at(rate)) for program in programs.values()), Counter()))  # type: ignore[arg-type]
-        for rate in ("frame", "sphere", "row", "pixel")
+    steps = [step for program in programs.values() for step in program.steps]
+    total: dict[str, dict[str, int]] = {
+        rate: dict(operations(step for step in steps if step.rate == rate)) for rate in RATES
     }
     return Emitted(
         name=name,
@@ -178,7 +184,9 @@ def _stored(need: Needs) -> tuple[str, ...]:
 def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
     groups: list[tuple[list[str], str]] = [(["n_x", "n_y", "n_z"], "outward normal")]
     if need.plane:
-        groups.append((["p_x", "p_y", "p_z"], "the point from its receiver's origin, in its unit: a sphere's is its normal"))
+        groups.append(
+            (["p_x", "p_y", "p_z"], "the point from its receiver's origin, in its unit: a sphere's is its normal")
+        )
     if "inv_d2" in stored:
         groups.append((["mirror_x", "mirror_y", "mirror_z"], "the ray mirrored there"))
         groups.append((["inv_d2"], "one over its length squared"))
@@ -189,14 +197,14 @@ def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
         groups.append((["cosine"], "max(0, n.l)"))
     if need.specular:
         groups.append((["lobe", "shininess"], "max(0, r.v)^n, and n"))
-    texts = [(f"    {real} {', '.join(f'{n}[ROOM]' for n in names)};", meaning) for names, meaning in groups]
+    texts = [(f"    {real} {', '.join(f'{n}[POINTS]' for n in names)};", meaning) for names, meaning in groups]
     width = max(len(text) for text, _ in texts) + 3
     return [f"{text.ljust(width)}/* {meaning} */" for text, meaning in texts]
 
 
 def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Primary:
-    bodies = PrimaryBodies(program, stored)
     kind = program.name
+    bodies = PrimaryBodies(program, stored, parts.OUTLINE if kind == "span" else ())
     given = [("ball", f"const {kind}_sphere *ball")] if bodies.has_sphere else []
     given.append(("f", f"const {kind}_frame *f"))
     names = [name for name, _ in given]
@@ -213,11 +221,13 @@ def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Prim
         sign_tests=tests,
         distance=distance,
         sight=sight,
+        outline=bodies.outline(),
         stores=[_LOOP + line for line in stores],
         void_row=_void(bodies.row.lines, names),
         void_distance=_void(distance, ["r", *names]),
         void_sight=_void(sight, ["r", *names]),
         void_surface=_void([*bodies.surface, *stores], ["r", *names]),
+        void_outline=_void(bodies.outline(), names),
     )
 
 
@@ -268,7 +278,7 @@ def _includes(programs: Mapping[str, KernelProgram], need: Needs) -> list[str]:
 def _cost(programs: Mapping[str, KernelProgram]) -> list[str]:
     lines = []
     for name, program in programs.items():
-        by_rate = [(rate, counts(program.at(rate))) for rate in ("frame", "sphere", "row", "pixel")]
+        by_rate = [(rate, counts(program.at(rate))) for rate in RATES]
         told = ", ".join(f"a {rate}: {text}" for rate, text in by_rate if text != "none")
         lines.append(f"{name}: {told}")
     return lines
@@ -302,7 +312,9 @@ class _Loops:
         if need.lit:
             found |= self._loop("reach", "reach")
             found |= self._loop("matte", "matte")
-            lamp = {name: f"scene->{{}}[{'light' if 'light_' in name else 'k'}]" for name in self.programs["lamp"].inputs}
+            lamp = {
+                name: f"scene->{{}}[{'light' if 'light_' in name else 'k'}]" for name in self.programs["lamp"].inputs
+            }
             found["lamp_lines"] = body(self.programs["lamp"].steps, lamp, _LOOP)
         if need.specular:
             found |= self._loop("glossy", "glossy")
@@ -341,7 +353,7 @@ class _Loops:
     ) -> dict[str, object]:
         program = self.programs[part]
         arrays = scene_parts(self.need)[part].arrays
-        places = {name: "p->{}[i]" for name in arrays}
+        places = dict.fromkeys(arrays, "p->{}[i]")
         places |= {f"p_{axis}": f"=p->{self.point}_{axis}[i]" for axis in "xyz"}
         steps = program.steps if results is None else closure(program.steps, results)
         before = [step for step in steps if step.rate != "pixel"]

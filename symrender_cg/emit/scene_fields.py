@@ -44,7 +44,7 @@ class Needs:
     def of(flags: frozenset[str]) -> Needs:
         """The needs of a plan's flags; `colour` makes three channels."""
         known = set(Needs.__dataclass_fields__) - {"channels"}
-        return Needs(channels=3 if "colour" in flags else 1, **{name: True for name in sorted(flags & known)})
+        return Needs(channels=3 if "colour" in flags else 1, **dict.fromkeys(sorted(flags & known), True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def scene_fields(need: Needs) -> tuple[Field, ...]:
     fields: list[tuple[bool, str, Shape, str]] = [
         (True, "eye", "number", "distance of the eye from the image plane"),
         (True, "spheres", "whole", "how many spheres the arrays hold,"),
-        (True, "visible", "whole", "and how many of them, the first, the eye may see: front to back by the power of the eye"),
+        (True, "visible", "whole", "and how many, the first, the eye may see: front to back by the power of the eye"),
         (True, "receivers", "whole", "spheres, then the materials of the plane: whatever light may fall on"),
         (True, "center_x", "reals", "[receivers] centre of a sphere; for the plane the eye"),
         (True, "center_y", "reals", ""),
@@ -96,8 +96,8 @@ def scene_fields(need: Needs) -> tuple[Field, ...]:
         (need.shadows, "blockers_begin", "wholes", "[lamps + 1] lists of the spheres that may stand before a lamp"),
         (need.shadows, "blockers", "wholes", ""),
         (need.mirrors, "reflect", "reals", "[receivers] how much of the mirrored ray's intensity is added"),
-        (need.mirrors, "bounces", "whole", "how often a ray is mirrored at most"),
-        (need.mirrors, "mirrors_begin", "wholes", "[receivers + 1] lists of the spheres that may be seen in a receiver"),
+        (need.mirrors, "bounces", "whole", "how often a ray is mirrored at most,"),
+        (need.mirrors, "mirrors_begin", "wholes", "[receivers + 1] lists of the spheres seen in a receiver"),
         (need.mirrors, "mirrors", "wholes", ""),
         (need.mirrors and need.plane, "mirror_plane", "wholes", "[receivers] the plane may be seen in it"),
         (need.plane, "plane_seen", "whole", "the eye may see the plane, not only mirrors"),

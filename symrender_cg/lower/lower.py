@@ -35,8 +35,8 @@ from symrender_cg.lower.variants import Variant
 from symrender_cg.plan.plan import Plan
 
 FUNCTIONS = {
-    "float64": {"power": "power", "cosine": "power_of_cosine", "floor": "floor"},
-    "float32": {"power": "powerf", "cosine": "power_of_cosinef", "floor": "floorf"},
+    "float64": {"power": "power", "cosine": "power_of_cosine"},
+    "float32": {"power": "powerf", "cosine": "power_of_cosinef"},
 }
 
 

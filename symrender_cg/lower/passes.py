@@ -127,8 +127,10 @@ def lower_powers(program: KernelProgram, functions: dict[str, str]) -> KernelPro
                 value = value.xreplace({power: call(functions["power"], power.base, power.exp)})
         for power in sorted(value.atoms(CosinePower), key=sp.default_sort_key):
             value = value.xreplace({power: call(functions["cosine"], *power.args)})
-        for whole in sorted(value.atoms(sp.floor), key=sp.default_sort_key):
-            value = value.xreplace({whole: call(functions["floor"], *whole.args)})
+        for function, name in ((sp.floor, "floor"), (sp.Abs, "fabs")):
+            of_format = f"{name}f" if step.format == "float32" else name
+            for applied in sorted(value.atoms(function), key=sp.default_sort_key):
+                value = value.xreplace({applied: call(of_format, *applied.args)})
         steps.append(replace(step, value=value))
     return program.with_steps(steps)
 

@@ -20,7 +20,7 @@ RATES: tuple[Rate, ...] = ("frame", "sphere", "row", "pixel")
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """name = value, once a frame, a sphere, a row or a pixel. The value is a sympy expression, and after freezing a `Node`."""
+    """name = value, once a frame, a sphere, a row or a pixel; a sympy expression, and after freezing a `Node`."""
 
     name: str
     value: sp.Basic

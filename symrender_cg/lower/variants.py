@@ -73,6 +73,16 @@ VARIANTS: tuple[Variant, ...] = (
                 "focal",
                 "plane_unit",
                 *("height2", "row_low", "row_high", "ahead", "hit_distance"),
+                *(
+                    "gap_room",
+                    "plain_gap",
+                    "less_gap",
+                    "least_gap",
+                    "most_disc",
+                    "most_half",
+                    "outline_left",
+                    "outline_right",
+                ),
                 *("descent", "p_x", "p_y", "p_z", "tile_u", "tile_v", "tile", "parity"),
             }
         ),

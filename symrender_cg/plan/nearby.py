@@ -40,8 +40,7 @@ def near_pairs(p: Floats, reach_p: Floats, q: Floats, reach_q: Floats) -> tuple[
     extent = float(max(p.max(), q.max()))
     slack = _ROUNDING * extent
     reach_p, reach_q = reach_p * (1.0 + _ROUNDING) + slack, reach_q * (1.0 + _ROUNDING) + slack
-    smallest = extent * 2.0 ** (2 - _CELL_BITS)
-    level_p, level_q = _levels(np.concatenate((reach_p, reach_q)), len(p), smallest)
+    level_p, level_q = _levels(np.concatenate((reach_p, reach_q)), len(p))
     found = [(nothing, nothing)]
     for level in np.unique(np.concatenate((level_p, level_q))):
         here_p, here_q = np.flatnonzero(level_p == level), np.flatnonzero(level_q == level)
@@ -55,9 +54,9 @@ def near_pairs(p: Floats, reach_p: Floats, q: Floats, reach_q: Floats) -> tuple[
     return np.concatenate([i for i, _ in found]), np.concatenate([j for _, j in found])
 
 
-def _levels(reach: Floats, split: int, smallest: float) -> tuple[Indices, Indices]:
-    """Exponents such that 2^level >= 2 reach and >= smallest, joined until few occur."""
-    _, exponent = np.frexp(np.maximum(2.0 * reach, max(smallest, 2.0**-1000)))
+def _levels(reach: Floats, split: int) -> tuple[Indices, Indices]:
+    """Exponents such that 2^level >= 2 reach, joined until few occur."""
+    _, exponent = np.frexp(np.maximum(2.0 * reach, 2.0**-1000))
     level = exponent.astype(np.int64)
     step = 1
     while np.unique(level).size > _LEVELS:
@@ -70,11 +69,14 @@ def _join(
     p: Floats, reach_p: Floats, chosen_p: Indices, q: Floats, reach_q: Floats, chosen_q: Indices, size: float
 ) -> tuple[Indices, Indices]:
     """Pairs of chosen ones, no reach above size / 2: those in the same cell of that size or in neighbours."""
-    cell_q = np.floor(q[chosen_q] / size).astype(np.int64) + 1
+    low = np.minimum(p[chosen_p].min(axis=0), q[chosen_q].min(axis=0))
+    extent = float(max((p[chosen_p] - low).max(), (q[chosen_q] - low).max()))
+    size = max(size, extent * 2.0 ** (2 - _CELL_BITS))
+    cell_q = np.floor((q[chosen_q] - low) / size).astype(np.int64) + 1
     key_q = _key(cell_q)
     order = np.argsort(key_q, kind="stable")
     key_q, chosen_q = key_q[order], chosen_q[order]
-    cell_p = np.floor(p[chosen_p] / size).astype(np.int64) + 1
+    cell_p = np.floor((p[chosen_p] - low) / size).astype(np.int64) + 1
     base = _key(cell_p)
     order = np.argsort(base, kind="stable")
     base, chosen_p = base[order], chosen_p[order]

@@ -40,7 +40,8 @@ class Decision:
     """One effect: needed, or absent with the inequality that proves it, or bounded; its numbers and its margin.
 
     margin: the tightest of all subjects, None where there is none or they are too many. bound: how much the image may
-    change where the effect, or part of it, is left out within the tolerance.
+    change where the effect, or, if it is needed, part of it, is left out within the tolerance; what two effects have in
+    common is in the bounds of both, `Plan.bound` is that of all.
     """
 
     effect: Effect
@@ -97,20 +98,25 @@ class Plan:
 
         return examine(look(self.given, aspect=self.aspect, force=self.force), self.max_error)
 
+    @cached_property
+    def bound(self) -> float:
+        """How much any pixel may change by what is left out although it is not absent; at most max_error."""
+        budget = self.examination.budget if self.max_error > 0.0 else None
+        return 0.0 if budget is None else budget.diffuse_bound + budget.specular_bound + budget.depth_bound
+
     def findings(self, name: str) -> tuple[Finding, ...]:
         """What was found for each subject of an effect, such as `spheres[3] on spheres[0] from lights[1]`.
 
         At most 10,000; a last one says how many more there are. Raises KeyError for an unknown effect.
         """
         from symrender_cg.plan.findings import FINDERS
+        from symrender_cg.plan.summary import summarise
 
-        finder = FINDERS[effect(name).name]
-        found = finder(self.examination)
-        first = tuple(islice(found, MOST_FINDINGS))
-        left = sum(1 for _ in found)
-        if left:
-            first += (Finding(True, f"and {left} more, not written out"),)
-        return first
+        found = tuple(islice(FINDERS[effect(name).name](self.examination), MOST_FINDINGS + 1))
+        if len(found) <= MOST_FINDINGS:
+            return found
+        left = summarise(name, self.examination).subjects - MOST_FINDINGS
+        return (*found[:MOST_FINDINGS], Finding(True, f"and {left} more, not written out"))
 
     def needs(self, effect: str) -> bool:
         """Whether the effect of that name can change the image."""
@@ -155,11 +161,11 @@ class Plan:
             return Decision(
                 entry, True, f"forced in; left out otherwise, for {finding.reason}", finding.margin, finding.bound
             )
-        if self.scene is not self.given and not finding.needed and entry.name in ("diffuse", "specular"):
+        if self.scene is not self.given and entry.name in ("diffuse", "specular"):
             from symrender_cg.plan.summary import summarise
 
             tally = summarise(entry.name, self.examination)
-            return Decision(entry, False, tally.reason, None, tally.bound)
+            return Decision(entry, finding.needed, tally.reason, None, tally.bound)
         return Decision(entry, finding.needed, finding.reason, finding.margin)
 
     def _of_scene(self, entry: Effect, found: Examination) -> Decision:

@@ -91,7 +91,7 @@ def _front_test(found: Examination) -> Tally:
 
 def _self_shadow(found: Examination) -> Tally:
     text = "a sphere is convex: where n.l > 0 the way to the light leaves it; where not, diffuse is 0"
-    return Tally(False, text, int(found.matters.sum()))
+    return Tally(False, text, int(found.matters[: found.measures.count].sum()))
 
 
 def _plane(found: Examination) -> Tally:
@@ -181,7 +181,7 @@ def _mirror(found: Examination) -> Tally:
     pairs = sum(count - (receiver < count) for receiver in mirrors.seen)
     kept = sum(len(others) for others in mirrors.seen.values())
     text = f"{_many(len(mirrors.seen), 'mirror')}, {kept} of {_many(pairs, 'pair')} of a sphere and a mirror"
-    return Tally(True, text, pairs + len(mirrors.mirror))
+    return Tally(True, text, pairs + int(mirrors.plane.sum()) + int((found.matters & ~mirrors.mirror).sum()))
 
 
 def _mirror_depth(found: Examination) -> Tally:
@@ -192,7 +192,7 @@ def _mirror_depth(found: Examination) -> Tally:
         text += f"; deeper ones add at most {bound:.6g}"
     elif bounces < limit:
         text += ": no longer chain of mirrors that may see one another"
-    return Tally(bounces > 1, text, limit + 1, bound)
+    return Tally(bounces > 1, text, max(limit, 1), bound)
 
 
 def _attenuation(found: Examination) -> Tally:

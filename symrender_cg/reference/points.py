@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from symrender_cg.errors import ArgumentError, OutsidePlanError
-from symrender_cg.scene import Scene
+from symrender_cg.scene import Colour, Gradient, PointLight, Scene
 
 if TYPE_CHECKING:
     from flint import arb
@@ -54,7 +54,7 @@ class FrameNumbers:
 def frame_numbers(scene: Scene) -> FrameNumbers:
     """The float64 numbers of `scene` in its camera's frame: exact from there on.
 
-    Raises OutsidePlanError unless the scene has exactly one sphere and one light.
+    Raises OutsidePlanError unless the scene is grey and has exactly one sphere and one point light.
     """
     for kind, members in (("spheres", scene.spheres), ("lights", scene.lights)):
         if len(members) != 1:
@@ -65,6 +65,8 @@ def frame_numbers(scene: Scene) -> FrameNumbers:
     framed = scene.in_camera_frame()
     sphere, light = framed.spheres[0], framed.lights[0]
     material = sphere.material
+    if not isinstance(light, PointLight):
+        raise OutsidePlanError(f"lights[0]: a {type(light).__name__}; this reference takes one PointLight")
     half_height = framed.camera.half_height
     assert half_height is not None, "a scene in the camera's frame has a half_height"
     return FrameNumbers(
@@ -73,14 +75,20 @@ def frame_numbers(scene: Scene) -> FrameNumbers:
         center=sphere.center,
         radius=sphere.radius,
         light=light.position,
-        intensity=light.intensity,
-        ambient=material.ambient,
-        diffuse=material.diffuse,
-        specular=material.specular,
+        intensity=_grey("lights[0].intensity", light.intensity),
+        ambient=_grey("spheres[0].material.ambient", material.ambient),
+        diffuse=_grey("spheres[0].material.diffuse", material.diffuse),
+        specular=_grey("spheres[0].material.specular", material.specular),
         shininess=material.shininess,
         gate_specular=material.gate_specular,
-        background=framed.background,
+        background=_grey("background", framed.background),
     )
+
+
+def _grey(place: str, value: Colour | Gradient) -> float:
+    if not isinstance(value, float):
+        raise OutsidePlanError(f"{place}: {value} is not one number; this reference takes grey scenes")
+    return value
 
 
 def as_points(x: npt.ArrayLike, y: npt.ArrayLike) -> Points:

@@ -50,9 +50,7 @@ class Drawing:
         """The shape of an array of intensities: that of the points, and the channels where there are three."""
         return points if self.channels == 1 else (*points, self.channels)
 
-    def rows(
-        self, image: NDArray[Any], begin: int, end: int, layers: Mapping[str, NDArray[Any]] | None = None
-    ) -> None:
+    def rows(self, image: NDArray[Any], begin: int, end: int, layers: Mapping[str, NDArray[Any]] | None = None) -> None:
         """Writes rows [begin, end) of an image with contiguous rows; `layers` only of kernels of scenes."""
         if isinstance(self.kernel, SceneKernel):
             self.kernel.rows(image, self.numbers, begin=begin, end=end, layers=layers)

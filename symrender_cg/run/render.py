@@ -97,9 +97,7 @@ def render_layers(
     if unknown := [name for name in names if name not in LAYERS]:
         raise ArgumentError(f"layers: {unknown[0]!r} is not known; expected some of {', '.join(LAYERS)}")
     chosen = load_scene(scene)
-    drawing = draw(
-        chosen, accuracy, size=(width, height), clip=clip, portable=portable, force=("scene",), cache=cache
-    )
+    drawing = draw(chosen, accuracy, size=(width, height), clip=clip, portable=portable, force=("scene",), cache=cache)
     arrays = layer_arrays(names, (height, width), drawing.channels, len(chosen.lights))
     image = np.empty(drawing.shape(height, width), drawing.dtype)
     over_rows(partial(drawing.rows, image, layers=arrays), height, thread_count(threads, width * height))
@@ -161,7 +159,8 @@ def _scene_indices(positions: NDArray[Any], plan: Plan) -> NDArray[Any]:
     assert plan.arrangement is not None, "layers come from the kernel of scenes"
     spheres, plane = plan.arrangement.spheres, len(plan.given.spheres)
     table = np.concatenate((spheres, [plane] * (plan.arrangement.receivers - len(spheres)), [-1])).astype(np.int32)
-    return table[positions]
+    indices: NDArray[Any] = table[positions]
+    return indices
 
 
 def _grid(width: int, height: int, pixel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -244,7 +243,8 @@ def _checked(out: NDArray[Any], shape: tuple[int, ...], dtype: np.dtype[Any]) ->
     if not isinstance(out, np.ndarray):
         raise ArgumentError(f"out: expected a numpy array of shape {shape} and dtype {dtype}, not {type(out).__name__}")
     if out.shape != shape:
-        raise ArgumentError(f"out: has shape {out.shape}; expected (height, width{', 3' if len(shape) == 3 else ''}) = {shape}")
+        words = "(height, width)" if len(shape) == 2 else "(height, width, 3)"
+        raise ArgumentError(f"out: has shape {out.shape}; expected {words} = {shape}")
     if out.dtype != dtype:
         raise ArgumentError(f"out: has dtype {out.dtype}; this accuracy writes {dtype}")
     if not out.flags.writeable:

@@ -90,9 +90,7 @@ class SceneKernel:
         if status:
             raise MemoryError(f"no memory for rows {begin} to {end} of the image")
 
-    def points(
-        self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], prepared: Prepared
-    ) -> None:
+    def points(self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], prepared: Prepared) -> None:
         """Writes the intensities at contiguous points. Releases the GIL."""
         ffi = self.library.ffi
         status = getattr(self.library.lib, f"{self.name}_points")(
@@ -110,9 +108,7 @@ class SceneKernel:
         return "float" if self.dtype == np.float32 else "double"
 
 
-def layer_arrays(
-    names: Sequence[str], shape: tuple[int, int], channels: int, lights: int
-) -> dict[str, NDArray[Any]]:
+def layer_arrays(names: Sequence[str], shape: tuple[int, int], channels: int, lights: int) -> dict[str, NDArray[Any]]:
     """Empty arrays for layers of an image of that shape; terms of a light that adds none stay 0."""
     colour = (*shape, channels)
     shapes: dict[str, tuple[int, ...]] = {

@@ -6,7 +6,6 @@ number is the scene's own, or rounded once from it. Never done here: a decision 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.plan.arrangement import Arrangement
-from symrender_cg.scene import Gradient, Phong, PointLight, Scene, exact
+from symrender_cg.scene import Colour, Gradient, Phong, PointLight, Scene, exact
 from symrender_cg.scene.exact import Vector
 
 DIFFUSE, SPECULAR, GATED = 1, 2, 4
@@ -77,12 +76,10 @@ def _wholes(values: NDArray[Any]) -> NDArray[np.int32]:
     return np.ascontiguousarray(values, dtype=np.int32)
 
 
-def _colour(value: Any, channels: int) -> tuple[float, ...]:
-    return tuple(value) if isinstance(value, tuple) else (value,) * channels
-
-
-def _colours(values: list[Any], channels: int) -> NDArray[np.float64]:
-    return np.array([_colour(value, channels) for value in values], dtype=np.float64).ravel()
+def _colours(values: list[Colour], channels: int) -> NDArray[np.float64]:
+    """Channels one after the other; where there is one, a colour is three equal numbers."""
+    rows = [value[:channels] if isinstance(value, tuple) else (value,) * channels for value in values]
+    return np.array(rows, dtype=np.float64).ravel()
 
 
 def _lights(frame: Scene, channels: int) -> dict[str, Any]:
@@ -130,7 +127,7 @@ def _background(frame: Scene, channels: int) -> dict[str, Any]:
     }
 
 
-def _plane(ground: _Ground | None) -> Mapping[str, Any]:
+def _plane(ground: _Ground | None) -> dict[str, Any]:
     if ground is None:
         return {}
     numbers: dict[str, Any] = {"across_0": ground.across_0, "along_0": ground.along_0}
@@ -156,9 +153,7 @@ def _ground(frame: Scene) -> _Ground:
     plane = frame.plane
     assert plane is not None
     grid = exact.grid_of((*frame.camera.eye, *plane.point))
-    offset = exact.difference(
-        exact.vector_on_grid(frame.camera.eye, grid), exact.vector_on_grid(plane.point, grid)
-    )
+    offset = exact.difference(exact.vector_on_grid(frame.camera.eye, grid), exact.vector_on_grid(plane.point, grid))
     normal = exact.vector_on_grid(plane.normal, exact.grid_of(plane.normal))
     square = exact.dot(normal, normal)
     height = exact.dot(normal, offset)

@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 
 def check_brightest(scene: Scene) -> None:
     """Refuse a scene in which an upper bound of some pixel's value is beyond float64."""
-    totals = [sum(_strength(light, channel) for light in scene.lights) for channel in range(3)]
-    brightest, mirrored = [0.0, 0.0, 0.0], 0.0
+    channels = scene.channels
+    totals = [sum(_strength(light, channel) for light in scene.lights) for channel in range(channels)]
+    brightest, mirrored = [0.0] * channels, 0.0
     for place, material in _materials(scene):
         mirrored = max(mirrored, material.reflect)
         for channel, total in enumerate(totals):

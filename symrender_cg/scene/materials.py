@@ -11,6 +11,8 @@ from msgspec.structs import force_setattr
 from symrender_cg.scene import values
 from symrender_cg.scene.values import Colour
 
+_COEFFICIENTS = tuple((name, f"the {name} coefficient") for name in ("ambient", "diffuse", "specular"))
+
 
 class Phong(Struct, frozen=True, forbid_unknown_fields=True, cache_hash=True):
     """I = ambient + sum over lights of intensity (diffuse max(0, n.l) + specular max(0, r.v)^shininess)   (Phong 1975)
@@ -29,9 +31,9 @@ class Phong(Struct, frozen=True, forbid_unknown_fields=True, cache_hash=True):
     reflect: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("ambient", "diffuse", "specular"):
-            meaning, remedy = f"the {name} coefficient", "write 0 to leave the term out"
-            force_setattr(self, name, values.colour(name, getattr(self, name), meaning, remedy))
+        for name, meaning in _COEFFICIENTS:
+            colour = values.colour(name, getattr(self, name), meaning, "write 0 to leave the term out")
+            force_setattr(self, name, colour)
         shininess = values.non_negative("shininess", self.shininess, "a shininess", "a wide highlight has one near 1")
         force_setattr(self, "shininess", shininess)
         force_setattr(self, "gate_specular", values.flag("gate_specular", self.gate_specular, "a switch"))

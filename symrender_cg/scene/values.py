@@ -42,6 +42,8 @@ def finite(place: str, value: object, meaning: str) -> float:
 
     Raises SceneError for text, bool and other types, for NaN, for infinity, for an integer beyond float64.
     """
+    if type(value) is float and isfinite(value):
+        return value + 0.0
     plain = _plain(value)
     if isinstance(plain, bool) or not isinstance(plain, Real):
         hint = "; write it without quotes" if isinstance(plain, str) else ""
@@ -102,6 +104,11 @@ def colour(place: str, value: object, meaning: str, remedy: str) -> Colour:
 
     A tuple of three equal numbers stays a tuple. The place of a wrong entry has its index, such as `ambient[1]`.
     """
+    if type(value) is tuple and len(value) == 3:
+        red, green, blue = value
+        plain_floats = type(red) is type(green) is type(blue) is float
+        if plain_floats and min(red, green, blue) >= 0.0 and isfinite(red + green + blue):
+            return red + 0.0, green + 0.0, blue + 0.0
     plain = _plain(value)
     if isinstance(plain, (list, tuple)):
         if len(plain) != 3:
