@@ -44,7 +44,7 @@ from symrender_cg.plan.effects import EFFECTS, SCENE
 from symrender_cg.plan.plan import Plan, require_format
 from symrender_cg.reference import brute_force, scene_oracle
 from symrender_cg.run.render import render_layers
-from symrender_cg.run.scene_kernel import SceneKernel
+from symrender_cg.run.scene_kernel import LAYERS, SceneKernel, layer_arrays
 from symrender_cg.run.scene_numbers import scene_numbers
 from symrender_cg.scene import Scene
 
@@ -56,6 +56,8 @@ EVERY_EFFECT: Final = Needs(
 )
 OPTIONAL: Final = tuple(entry.name for entry in EFFECTS if entry.optional)
 """Effects that can be forced in."""
+
+TERMS: Final = ("background", "ambient", "reflected", "diffuse", "specular")
 
 OTHER_FORM: Final = frozenset({"front_test"})
 """Effects that change the form in which a normal is computed, not only what is looped over."""
@@ -111,8 +113,20 @@ class EveryEffect:
         self.kernel.rows(image, prepared, begin=0, end=height, layers=layers)
         return _in_channels_of(found, image)
 
+    def layers(self, found: Plan, width: int, height: int) -> dict[str, NDArray[Any]]:
+        """What `render_layers` returns: the image, depth, normal, index and terms."""
+        arrangement = found.arrangement
+        assert arrangement is not None, "planned with the kernel of scenes forced"
+        arrays = layer_arrays(LAYERS, (height, width), 3, len(found.given.lights))
+        image = self.image(found, width, height, arrays)
+        plane, spheres = len(found.given.spheres), arrangement.spheres
+        table = np.concatenate((spheres, [plane] * (arrangement.receivers - len(spheres)), [-1]))
+        for name in TERMS:
+            arrays[name] = _in_channels_of(found, arrays[name])
+        return {"image": image, **arrays, "index": table[arrays["index"]]}
+
     def points(self, found: Plan, x: Floats, y: Floats) -> Any:
-        """The same at points, which have one shape."""
+        """The same as the image at points, which have one shape."""
         prepared = self.kernel.prepare(self.numbers(found), white=np.inf)
         values = np.empty((*x.shape, 3), self.kernel.dtype)
         self.kernel.points(values, np.ascontiguousarray(x), np.ascontiguousarray(y), prepared)
@@ -158,18 +172,21 @@ class Compared:
     refused: bool
 
 
-def compare(scene: Scene, seed: int, width: int, height: int, root: Path) -> Compared:
-    """A scene by every kernel that can draw it, against what is known to be true."""
+def compare(scene: Scene, seed: int, width: int, height: int, root: Path, *, own: bool = True) -> Compared:
+    """A scene by every kernel that can draw it, against what is known to be true.
+
+    own: the scene's own kernel is compiled and judged; without it the one with every effect is.
+    """
     traced = brute_force.image(scene, width, height)
     aspect = width / height
     found = planned(scene, force=(SCENE,), aspect=aspect)
-    drawn = render_layers(scene, width, height, cache=root)
+    every = every_effect("double", root)
+    drawn = render_layers(scene, width, height, cache=root) if own else every.layers(found, width, height)
     x, y = grid(found.scene, width, height)
     true = scene_oracle.index(scene, x, y)
     clear = traced.doubt > DOUBT["double"]
     wrong = drawn["index"] != true
 
-    every = _every_effect("double", root)
     changed = {"text": largest_change(every.image(found, width, height), drawn["image"])}
     for name in OPTIONAL:
         forced = planned(scene, force=tuple(sorted({SCENE, name})), aspect=aspect)
@@ -183,10 +200,7 @@ def compare(scene: Scene, seed: int, width: int, height: int, root: Path) -> Com
     except OutsidePlanError:
         refused = True
     else:
-        error_single = errors(_every_effect("single", root).image(found, width, height), traced.value, clear_single)
-    total = sum(
-        drawn[name] for name in ("background", "ambient", "reflected")
-    ) + drawn["diffuse"].sum(axis=0) + drawn["specular"].sum(axis=0)
+        error_single = errors(every_effect("single", root).image(found, width, height), traced.value, clear_single)
     everywhere = np.ones(traced.doubt.shape, dtype=bool)
     return Compared(
         seed=seed,
@@ -196,15 +210,19 @@ def compare(scene: Scene, seed: int, width: int, height: int, root: Path) -> Com
         doubtful_single=int((~clear_single).sum()),
         error=errors(drawn["image"], traced.value, clear),
         error_single=error_single,
-        geometry=max(
-            relative(drawn["depth"], traced.depth, clear), errors(drawn["normal"], traced.normal, clear)
-        ),
-        terms=errors(total, drawn["image"], everywhere),
+        geometry=max(relative(drawn["depth"], traced.depth, clear), errors(drawn["normal"], traced.normal, clear)),
+        terms=errors(sum_of_terms(drawn), drawn["image"], everywhere),
         wrong=int(wrong.sum()),
         sure=int((wrong & clear).sum()),
         changed={name: change for name, change in changed.items() if change != 0.0},
         refused=refused,
     )
+
+
+def sum_of_terms(drawn: Mapping[str, NDArray[Any]]) -> Any:
+    """What the layers of terms add up to."""
+    first = drawn["background"] + drawn["ambient"] + drawn["reflected"]
+    return first + drawn["diffuse"].sum(axis=0) + drawn["specular"].sum(axis=0)
 
 
 def grid(frame: Scene, width: int, height: int) -> tuple[Floats, Floats]:
@@ -238,7 +256,8 @@ def largest_change(values: Any, others: Any) -> float:
 
 
 @cache
-def _every_effect(accuracy: str, root: Path) -> EveryEffect:
+def every_effect(accuracy: str, root: Path) -> EveryEffect:
+    """`EveryEffect.compiled`, once a process."""
     return EveryEffect.compiled(accuracy, root)
 
 
@@ -310,7 +329,7 @@ def measure_random_scenes(
     with tempfile.TemporaryDirectory(prefix="symrender_cg-") as place:
         root = Path(place)
         for accuracy in ("double", "single"):
-            _every_effect(accuracy, root)
+            every_effect(accuracy, root)
         found: list[Compared] = []
         with ProcessPoolExecutor(jobs or cores()) as pool:
             tasks = [(seed, size, root) for seed in range(first, first + count)]

@@ -209,11 +209,11 @@ def test_a_shadow_outside_the_window_is_kept_where_a_mirror_shows_the_plane() ->
 
 
 def test_a_mirror_shows_the_lit_side_that_the_eye_does_not_see() -> None:
-    """The light is behind the sphere, and so is the mirror: left out without it, needed with it."""
+    """The light is behind the sphere, and beside it is a mirror: the light is left out without it, needed with it."""
     sphere = Sphere((0.0, 0.0, 1.0), 0.5, GATED)
     for reflect, lit in ((0.0, 0), (1.0, 1)):
-        mirror = Sphere((0.0, 0.0, -3.0), 2.0, Phong(0.1, 0.0, 0.0, reflect=reflect))
-        frame = Scene(CAMERA, (sphere, mirror), (PointLight((0.0, 0.0, -0.25)),))
+        mirror = Sphere((1.6, 0.0, -1.2), 0.9, Phong(0.1, 0.0, 0.0, reflect=reflect))
+        frame = Scene(CAMERA, (sphere, mirror), (PointLight((0.6, 0.0, -0.1)),))
         found = arrange(frame, aspect=None)
         assert len(found.lamp_light) == lit
         x, y = np.meshgrid(np.linspace(-1.9, 1.9, 31), np.linspace(-1.9, 1.9, 31))

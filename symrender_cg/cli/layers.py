@@ -3,7 +3,7 @@
 Comes in: the arrays of render_layers. Goes out: one file a layer, or, for a .npz, all of them in the image's own file.
 
     .npy, .pfm     the numbers (float32 in a .pfm)
-    .png           depth     near is white, far is dark, linear between; the background is black
+    .png           depth     near is white, far is dark, linear in 1 / depth; the background is black
                    normal    (n + 1) / 2 as RGB, camera's frame; the background is black
                    index     one colour a sphere, by turns of the golden angle; the background is black
                    terms     as the image: cut to [0, 1], its bits and its encoding
@@ -78,14 +78,17 @@ def _write(place: Path, name: str, array: NDArray[Any], bits: int | None, encodi
 
 
 def depth_picture(depth: NDArray[Any]) -> tuple[NDArray[Any], str]:
-    """Grey from 1 at the nearest to DARKEST at the farthest point, 0 where nothing is seen; and the two depths."""
+    """Grey, linear in 1 / depth, 1 at the nearest and DARKEST at the farthest point, 0 where nothing is seen.
+
+    And the two depths in words. A plane goes on to the horizon: linear in the depth all that is near would be white.
+    """
     seen = np.isfinite(depth)
     if not seen.any():
         return np.zeros(depth.shape), "nothing is seen"
     near, far = float(depth[seen].min()), float(depth[seen].max())
-    span = far - near if far > near else 1.0
-    shown = np.where(seen, 1.0 - (1.0 - DARKEST) * ((np.where(seen, depth, near) - near) / span), 0.0)
-    return shown, f"{near:.6g} is white, {far:.6g} dark grey, the background black"
+    share = (near / depth - near / far) / (1.0 - near / far) if far > near else np.ones(depth.shape)
+    shown = np.where(seen, DARKEST + (1.0 - DARKEST) * share, 0.0)
+    return shown, f"1 / depth, {near:.6g} is white, {far:.6g} dark grey, the background black"
 
 
 def normal_picture(normal: NDArray[Any]) -> tuple[NDArray[Any], str]:
@@ -99,4 +102,4 @@ def index_picture(index: NDArray[Any]) -> tuple[NDArray[Any], str]:
     count = int(index.max()) + 1
     hues = [(_GOLDEN * k % 1.0, 0.75 if k % 2 else 0.55, 1.0 if k % 3 else 0.8) for k in range(count)]
     table = np.array([*(colorsys.hsv_to_rgb(*hue) for hue in hues), (0.0, 0.0, 0.0)])
-    return table[index], f"{len(np.unique(index[index >= 0]))} surfaces, the background black"
+    return table[index], f"a colour for each of {len(np.unique(index[index >= 0]))} that are seen, the background black"

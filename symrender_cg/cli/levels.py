@@ -7,19 +7,21 @@ from collections.abc import Sequence
 
 from symrender_cg.errors import OutsidePlanError
 from symrender_cg.lower.variants import ACCURACIES, variant
+from symrender_cg.pipeline import require_kind
 from symrender_cg.plan.plan import plan, require_format
 from symrender_cg.scene import Scene
 
 
-def accuracies_for(scene: Scene, asked: Sequence[str] | str) -> tuple[str, ...]:
+def accuracies_for(scene: Scene, asked: Sequence[str] | str, *, bake: bool = False) -> tuple[str, ...]:
     """`all` -> every accuracy that the scene can have, the others named on stderr; a list -> that list.
 
-    Raises OutsidePlanError where a list asks for one that the scene cannot have.
+    Raises OutsidePlanError where a list asks for one that the scene cannot have, ArgumentError where it cannot be baked.
     """
     found = plan(scene)
     possible = []
     for name in ACCURACIES if asked == "all" else asked:
         try:
+            require_kind(found, variant(name), bake=bake)
             require_format(scene, found, variant(name).shading)
         except OutsidePlanError as refusal:
             if asked != "all":

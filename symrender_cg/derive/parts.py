@@ -224,13 +224,17 @@ def shading_part(*, glossy: bool) -> Part:
 
 
 def fading_part() -> Part:
-    """1 / (a + b l + c l^2) at the distance l = |w| r, with b r and c r^2 given."""
-    a, b, c, length = symbols("fade_a fade_b fade_c w_length")
+    """1 / (a + b l + c l^2) at the distance l = |w| r, with b r and c r^2 given, for |w|^2 up to farthest2."""
+    section = "attenuation"
+    a, b, c, length, w2, farthest2 = symbols("fade_a fade_b fade_c w_length w2 farthest2")
+    finite = sp.Piecewise((w2, farthest2 - w2 > 0), (farthest2, True))
     definitions = (
-        Definition("w_length", sp.sqrt(S("w2")), "attenuation", "l / r"),
-        Definition("fading", 1 / (a + length * (b + length * c)), "attenuation", "1 / (a + b l + c l^2)"),
+        Definition("finite_w2", finite, section, "|w|^2, finite also at the horizon of a plane"),
+        Definition("w_length", sp.sqrt(S("finite_w2")), section, "l / r"),
+        Definition("fading", 1 / (a + length * (b + length * c)), section, "1 / (a + b l + c l^2)"),
     )
-    rates = (*((f"fade_{k}", "sphere") for k in "abc"), ("w2", "pixel"))
+    given = ("fade_a", "fade_b", "fade_c", "farthest2")
+    rates = (*((name, "sphere") for name in given), ("w2", "pixel"))
     return Part("fading", definitions, ("fading",), rates, ("w2",))
 
 

@@ -16,7 +16,7 @@ from symrender_cg.derive.parts import Part
 from symrender_cg.emit.bodies import INDENT, body, closure, counts, operations
 from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test
 from symrender_cg.emit.parts import PrimaryBodies
-from symrender_cg.emit.scene_fields import Needs, scene_fields
+from symrender_cg.emit.scene_fields import Needs, field_lines, scene_fields
 from symrender_cg.lower.nodes import Call, walk
 from symrender_cg.lower.program import RATES, KernelProgram
 from symrender_cg.lower.variants import Variant
@@ -98,6 +98,7 @@ def emit_scene(
     stored = _stored(need)
     primaries = [_primary(programs[key], need, stored) for key in ("span", "near", "plane") if key in programs]
     fields = scene_fields(need)
+    lines = field_lines(fields)
     writer = _Loops(programs, need)
     includes = _includes(programs, need)
     held = [f"{part.name}s" for part in primaries if part.bodies.has_sphere]
@@ -137,8 +138,8 @@ def emit_scene(
         "left_test": "".join(f"{condition} && " for condition in spared),
         "mirrored_spheres": need.mirrors,
         "primaries": primaries,
-        "fields": fields,
-        "width": max(len(field.declaration) for field in fields) + 3,
+        "fields": lines,
+        "width": max(len(line.declaration) for line in lines) + 3,
         "includes": includes,
         "point_arrays": _point_arrays(need, stored, real),
         "held_arrays": held,
@@ -184,9 +185,7 @@ def _stored(need: Needs) -> tuple[str, ...]:
 def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
     groups: list[tuple[list[str], str]] = [(["n_x", "n_y", "n_z"], "outward normal")]
     if need.plane:
-        groups.append(
-            (["p_x", "p_y", "p_z"], "the point from its receiver's origin, in its unit: a sphere's is its normal")
-        )
+        groups.append((["p_x", "p_y", "p_z"], "from its receiver's origin, in its unit: a sphere's normal"))
     if "inv_d2" in stored:
         groups.append((["mirror_x", "mirror_y", "mirror_z"], "the ray mirrored there"))
         groups.append((["inv_d2"], "one over its length squared"))
@@ -198,8 +197,7 @@ def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
     if need.specular:
         groups.append((["lobe", "shininess"], "max(0, r.v)^n, and n"))
     texts = [(f"    {real} {', '.join(f'{n}[POINTS]' for n in names)};", meaning) for names, meaning in groups]
-    width = max(len(text) for text, _ in texts) + 3
-    return [f"{text.ljust(width)}/* {meaning} */" for text, meaning in texts]
+    return [f"{text}   /* {meaning} */" for text, meaning in texts]
 
 
 def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Primary:

@@ -48,6 +48,14 @@ class Needs:
 
 
 @dataclass(frozen=True, slots=True)
+class Line:
+    """A line of the structure: fields of one type that are explained together."""
+
+    declaration: str
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
 class Field:
     """One field: its name, whether a number or an array of reals or whole numbers, and its meaning."""
 
@@ -55,11 +63,23 @@ class Field:
     shape: Shape
     meaning: str
 
-    @property
-    def declaration(self) -> str:
-        """Its declaration in C."""
-        types = {"number": "double ", "whole": "int ", "reals": "const double *", "wholes": "const int *"}
-        return f"{types[self.shape]}{self.name};"
+
+_TYPES = {"number": ("double", ""), "whole": ("int", ""), "reals": ("const double", "*"), "wholes": ("const int", "*")}
+
+
+def field_lines(fields: tuple[Field, ...]) -> tuple[Line, ...]:
+    """The declarations in C; a field without a meaning of its own stands on the line of the one before it."""
+    groups: list[list[Field]] = []
+    for field in fields:
+        if field.meaning or not groups or groups[-1][0].shape != field.shape:
+            groups.append([])
+        groups[-1].append(field)
+    lines = []
+    for group in groups:
+        kind, star = _TYPES[group[0].shape]
+        names = ", ".join(star + field.name for field in group)
+        lines.append(Line(f"{kind} {names};", group[0].meaning))
+    return tuple(lines)
 
 
 def scene_fields(need: Needs) -> tuple[Field, ...]:
@@ -68,12 +88,12 @@ def scene_fields(need: Needs) -> tuple[Field, ...]:
     fields: list[tuple[bool, str, Shape, str]] = [
         (True, "eye", "number", "distance of the eye from the image plane"),
         (True, "spheres", "whole", "how many spheres the arrays hold,"),
-        (True, "visible", "whole", "and how many, the first, the eye may see: front to back by the power of the eye"),
-        (True, "receivers", "whole", "spheres, then the materials of the plane: whatever light may fall on"),
+        (True, "visible", "whole", "and how many the eye may see: the first, front to back"),
+        (True, "receivers", "whole", "spheres, then the plane's materials: what may be lit"),
         (True, "center_x", "reals", "[receivers] centre of a sphere; for the plane the eye"),
         (True, "center_y", "reals", ""),
         (True, "center_z", "reals", ""),
-        (True, "radius", "reals", "[receivers] radius of a sphere; for the plane the height of the eye above it"),
+        (True, "radius", "reals", "[receivers] radius; for the plane the eye's height above it"),
         (need.at_eye and need.spans, "at_eye", "wholes", "[visible] the sphere reaches the plane of the eye"),
         (need.intersections, "partners_begin", "wholes", "[visible + 1] lists of the spheres before it"),
         (need.intersections, "partners", "wholes", "that a sphere intersects"),
@@ -82,7 +102,7 @@ def scene_fields(need: Needs) -> tuple[Field, ...]:
         (need.lit, "diffuse", "reals", f"[receivers]{c} diffuse coefficient"),
         (need.lit, "specular", "reals", f"[receivers]{c} specular coefficient"),
         (need.specular, "shininess", "reals", "[receivers] exponent of the specular term"),
-        (need.lit, "light_x", "reals", "[lights] place of a point light; for one in parallel the unit vector to it"),
+        (need.lit, "light_x", "reals", "[lights] place; for a light in parallel unit vector to it"),
         (need.lit, "light_y", "reals", ""),
         (need.lit, "light_z", "reals", ""),
         (need.lit, "nearness", "reals", "[lights] 1 for a point light, 0 for one in parallel"),
@@ -90,21 +110,21 @@ def scene_fields(need: Needs) -> tuple[Field, ...]:
         (need.attenuation, "fade_a", "reals", "[lights] attenuation 1 / (a + b l + c l^2) at the distance l"),
         (need.attenuation, "fade_b", "reals", ""),
         (need.attenuation, "fade_c", "reals", ""),
-        (need.lit, "lamps_begin", "wholes", "[receivers + 1] lists of lamps: a light that may light the receiver"),
+        (need.lit, "lamps_begin", "wholes", "[receivers + 1] lists of lamps, lights of a receiver"),
         (need.lit, "lamp_light", "wholes", "which light,"),
-        (need.lit, "lamp_terms", "wholes", "and which terms: 1 diffuse, 2 specular, 4 specular only where n.l > 0"),
-        (need.shadows, "blockers_begin", "wholes", "[lamps + 1] lists of the spheres that may stand before a lamp"),
+        (need.lit, "lamp_terms", "wholes", "terms: 1 diffuse, 2 specular, 4 that where n.l > 0 alone"),
+        (need.shadows, "blockers_begin", "wholes", "[lamps + 1] lists of spheres that may be before it"),
         (need.shadows, "blockers", "wholes", ""),
         (need.mirrors, "reflect", "reals", "[receivers] how much of the mirrored ray's intensity is added"),
-        (need.mirrors, "bounces", "whole", "how often a ray is mirrored at most,"),
-        (need.mirrors, "mirrors_begin", "wholes", "[receivers + 1] lists of the spheres seen in a receiver"),
+        (need.mirrors, "bounces", "whole", "how often a ray is mirrored at most"),
+        (need.mirrors, "mirrors_begin", "wholes", "[receivers + 1] lists of spheres seen in it"),
         (need.mirrors, "mirrors", "wholes", ""),
         (need.mirrors and need.plane, "mirror_plane", "wholes", "[receivers] the plane may be seen in it"),
         (need.plane, "plane_seen", "whole", "the eye may see the plane, not only mirrors"),
         (need.plane, "plane_x", "number", "unit normal of the plane, on the eye's side"),
         (need.plane, "plane_y", "number", ""),
         (need.plane, "plane_z", "number", ""),
-        (need.checker, "across_x", "number", "number of a tile across, of the point p: floor(across.p + across_0)"),
+        (need.checker, "across_x", "number", "a tile's number across: floor(across.p + across_0)"),
         (need.checker, "across_y", "number", ""),
         (need.checker, "across_z", "number", ""),
         (need.checker, "across_0", "number", ""),

@@ -22,23 +22,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 from msgspec import structs
 
-from symrender_cg.errors import AccuracyError
-from symrender_cg.lower.variants import ACCURACIES
-from symrender_cg.pipeline import compile_kernel
+from symrender_cg.lower.variants import ACCURACIES, variant
+from symrender_cg.pipeline import draw
+from symrender_cg.plan.plan import plan
 from symrender_cg.reference import compare, oracle, points
+from symrender_cg.reference.check_rows import Report, Row
 from symrender_cg.reference.per_pixel import evaluate_per_pixel
 from symrender_cg.reference.points import Points
 from symrender_cg.reference.vectorised import evaluate_vectorised
+from symrender_cg.run.drawing import Drawing
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.numbers import numbers_of
-from symrender_cg.scene import Phong, Scene
+from symrender_cg.scene import Phong, PointLight, Scene
 
 UNIT_ROUNDOFF = {"double": 2.0**-53, "single": 2.0**-24}
 DOUBT = 32.0
@@ -53,76 +55,20 @@ Values = npt.NDArray[np.float64] | npt.NDArray[np.float32]
 Evaluator = Callable[[Scene, npt.NDArray[np.float64], npt.NDArray[np.float64]], Values]
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One evaluator on one set of points.
-
-    evaluator    `kernel double`, `numpy stable`, `numpy literal`, `per pixel`
-    accuracy     of a kernel, else empty
-    where        the set of points;  count: how many were compared
-    max_ulp, max_abs      largest error against the oracle, in ulp of the answer and absolute
-    wrong_hits   points where hit or miss differs from the oracle's exact decision
-    in_doubt     points of a gated scene so near the terminator that rounding decides whether there is a highlight: the
-                 field jumps there, and no bound is stated of them; they are left out of the errors
-    non_finite   values that are NaN or infinite where the truth is not
-    from_numpy, from_per_pixel    largest absolute difference of a kernel from the float references, None for those
-    bound        the stated bound on max_abs, None where none is stated
-    """
-
-    evaluator: str
-    accuracy: str
-    where: str
-    count: int
-    max_ulp: float
-    max_abs: float
-    wrong_hits: int
-    in_doubt: int
-    non_finite: int
-    from_numpy: float | None = None
-    from_per_pixel: float | None = None
-    bound: float | None = None
-
-    @property
-    def holds(self) -> bool:
-        """Whether what is stated holds: the bound, no wrong hit, nothing that is not finite. True where nothing is."""
-        if self.bound is None:
-            return True
-        return self.max_abs <= self.bound and self.wrong_hits == 0 and self.non_finite == 0
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """All rows, the image's size, and how many points the per-pixel loop computed of each set."""
-
-    width: int
-    height: int
-    per_pixel_points: dict[str, int]
-    rows: tuple[Row, ...]
-
-    def require(self) -> None:
-        """Raises AccuracyError naming the first row whose stated bound is broken."""
-        for row in self.rows:
-            if not row.holds:
-                broken = sum(not r.holds for r in self.rows)
-                raise AccuracyError(
-                    f"{row.evaluator}, {row.where}: largest error {row.max_abs:.3g}, stated bound {row.bound:.3g}; "
-                    f"{row.wrong_hits} wrong hits, {row.non_finite} values not finite, both stated as 0 "
-                    f"({broken} of {len(self.rows)} rows broken); please report the scene"
-                )
-
-
 def stated_bound(scene: Scene, accuracy: str) -> float | None:
     """u I (6 + 2 sqrt(n)) (1 + 1 / (4 d)), see above; None for `literal`, and for a light on the surface."""
     unit = UNIT_ROUNDOFF.get(accuracy)
     frame = scene.in_camera_frame()
     sphere, light = frame.spheres[0], frame.lights[0]
-    material = sphere.material
+    assert isinstance(light, PointLight), "a scene of one sphere under one point light"
+    numbers = numbers_of(frame)
     away = math.dist(light.position, sphere.center) / sphere.radius
     distance = abs(away - 1.0)
     if unit is None or not distance > 0.0:
         return None
-    brightest = max(1.0, material.ambient + light.intensity * (material.diffuse + material.specular), frame.background)
-    bound = unit * brightest * (6.0 + 2.0 * math.sqrt(material.shininess)) * (1.0 + 0.25 / distance)
+    lit = numbers["k_ambient"] + numbers["light_intensity"] * (numbers["k_diffuse"] + numbers["k_specular"])
+    brightest = max(1.0, lit, numbers["background"])
+    bound = unit * brightest * (6.0 + 2.0 * math.sqrt(numbers["shininess"])) * (1.0 + 0.25 / distance)
     return bound if math.isfinite(bound) else None
 
 
@@ -133,22 +79,32 @@ def check(
     height: int = 96,
     count: int = 1000,
     seed: int = 1,
-    accuracies: tuple[str, ...] = ACCURACIES,
+    accuracies: tuple[str, ...] | None = None,
     portable: bool = False,
 ) -> Report:
     """Compares the kernels of a scene and the float references with the oracle.
 
-    On the pixel centres of a width x height image, and on `count` seeded points near the silhouette, the terminator and
-    the highlight. Raises OutsidePlanError for a scene that no plan covers; never AccuracyError: see Report.require.
+    On the pixel centres of a width x height image, and on `count` seeded points near each kind of hard place: the
+    silhouette, the terminator and the highlight; for scenes see check_scene. accuracies: all that there are, if not
+    given. Raises OutsidePlanError for a scene that no plan covers; never AccuracyError: see Report.require.
     """
-    kernels = {accuracy: compile_kernel(scene, accuracy, portable=portable) for accuracy in accuracies}
+    found = plan(scene)
+    if found.arrangement is not None or found.scene is not found.given:
+        exact = tuple(name for name in ACCURACIES if variant(name).exact) if accuracies is None else accuracies
+        from symrender_cg.reference.check_scene import scene_rows
+
+        rows = scene_rows(
+            scene, width=width, height=height, count=count, seed=seed, accuracies=exact, portable=portable
+        )
+        return Report(width, height, {}, _by_evaluator(rows))
+    kernels = {accuracy: draw(scene, accuracy, portable=portable) for accuracy in accuracies or ACCURACIES}
     frame = scene.in_camera_frame()
     sets = {f"image {width}x{height}": points.whole_image(frame, width, height)}
     if count:
         sets["near silhouette"] = points.near_silhouette(frame, count, seed)
         sets["near terminator"] = points.near_terminator(frame, count, seed)
         sets["near highlight"] = points.near_highlight(frame, count, seed)
-    rows: list[Row] = []
+    rows = []
     sampled: dict[str, int] = {}
     for where, (x, y) in sets.items():
         if x.size == 0:
@@ -156,12 +112,16 @@ def check(
         few = slice(None, None, -(-x.size // PER_PIXEL_POINTS))
         sampled[where] = x[few].size
         rows += _rows(frame, where, (x, y), few, kernels)
+    return Report(width, height, sampled, _by_evaluator(rows))
+
+
+def _by_evaluator(rows: list[Row]) -> tuple[Row, ...]:
+    """The rows of one evaluator together, in the order in which they begin."""
     order = {name: k for k, name in enumerate(dict.fromkeys(row.evaluator for row in rows))}
-    rows.sort(key=lambda row: order[row.evaluator])
-    return Report(width, height, sampled, tuple(rows))
+    return tuple(sorted(rows, key=lambda row: order[row.evaluator]))
 
 
-def _rows(frame: Scene, where: str, where_points: Points, few: slice, kernels: dict[str, Kernel]) -> list[Row]:
+def _rows(frame: Scene, where: str, where_points: Points, few: slice, kernels: dict[str, Drawing]) -> list[Row]:
     x, y = where_points
     answers = oracle.evaluate(frame, x, y)
     some = oracle.Answers(answers.value[few], answers.residual[few], answers.hit[few], answers.value32[few])
@@ -225,7 +185,10 @@ def _in_doubt(
     return doubtful
 
 
-def _by_kernel(kernel: Kernel) -> Evaluator:
+def _by_kernel(drawing: Drawing) -> Evaluator:
+    kernel = drawing.kernel
+    assert isinstance(kernel, Kernel), "one sphere under one light has the kernel of one sphere"
+
     def evaluate(frame: Scene, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> Values:
         values = np.empty(x.shape, kernel.dtype)
         kernel.points(values, x, y, kernel.numbers(numbers_of(frame)), white=math.inf)
