@@ -52,7 +52,7 @@ Floats = NDArray[np.float64]
 
 EVERY_EFFECT: Final = Needs(
     channels=3,
-    **dict.fromkeys(sorted(set(Needs.__dataclass_fields__) - {"channels"}), True),  # type: ignore[arg-type]
+    **dict.fromkeys(sorted(set(Needs.__dataclass_fields__) - {"channels"}), True),
 )
 OPTIONAL: Final = tuple(entry.name for entry in EFFECTS if entry.optional)
 """Effects that can be forced in."""
@@ -153,6 +153,7 @@ class Compared:
     """One scene. Errors over max(1, value); `key` names its kernel; `refused`: by float32.
 
     doubtful     pixels not compared, of double and of single
+    infinite     values of double and of single that are no finite numbers
     wrong        pixels with another index than the oracle's; `sure`: of them those not in doubt
     changed      by what was put back, the largest change of any pixel; only changes
     """
@@ -166,6 +167,7 @@ class Compared:
     error_single: float
     geometry: float
     terms: float
+    infinite: int
     wrong: int
     sure: int
     changed: dict[str, float]
@@ -194,13 +196,16 @@ def compare(scene: Scene, seed: int, width: int, height: int, root: Path, *, own
     anywhere = planned(scene, force=(SCENE,))
     changed["points"] = largest_change(every.points(anywhere, x, y), drawn["image"])
 
+    infinite = int((~np.isfinite(drawn["image"])).sum())
     refused, error_single, clear_single = False, 0.0, traced.doubt > DOUBT["single"]
     try:
         require_format(found.scene, found, "float32")
     except OutsidePlanError:
         refused = True
     else:
-        error_single = errors(every_effect("single", root).image(found, width, height), traced.value, clear_single)
+        narrow = every_effect("single", root).image(found, width, height)
+        error_single = errors(narrow, traced.value, clear_single)
+        infinite += int((~np.isfinite(narrow)).sum())
     everywhere = np.ones(traced.doubt.shape, dtype=bool)
     return Compared(
         seed=seed,
@@ -212,6 +217,7 @@ def compare(scene: Scene, seed: int, width: int, height: int, root: Path, *, own
         error_single=error_single,
         geometry=max(relative(drawn["depth"], traced.depth, clear), errors(drawn["normal"], traced.normal, clear)),
         terms=errors(sum_of_terms(drawn), drawn["image"], everywhere),
+        infinite=infinite,
         wrong=int(wrong.sum()),
         sure=int((wrong & clear).sum()),
         changed={name: change for name, change in changed.items() if change != 0.0},
@@ -318,6 +324,10 @@ class Report:
             f"single {sum(s.doubtful_single for s in self.scenes):,} of {pixels:,}; "
             f"scenes that single refuses: {sum(s.refused for s in self.scenes)}"
         )
+        seeds = [str(scene.seed) for scene in self.scenes if scene.infinite][:LISTED]
+        lines.append(
+            f"values that are no finite number: {sum(s.infinite for s in self.scenes)} {' '.join(seeds)}".rstrip()
+        )
         return lines
 
 
@@ -350,7 +360,8 @@ def random_scenes() -> Callable[[int], Scene]:
     """The test suite's function of a number, which is no part of any package."""
     place = ROOT / "tests" / "scene_strategies.py"
     specification = importlib.util.spec_from_file_location("scene_strategies", place)
-    assert specification is not None and specification.loader is not None, place
+    assert specification is not None, place
+    assert specification.loader is not None, place
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
     found: Callable[[int], Scene] = module.random_scene

@@ -15,7 +15,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from symrender_cg.errors import ArgumentError
 from symrender_cg.output import replacing
@@ -24,7 +24,7 @@ from symrender_cg.version import VERSION
 if TYPE_CHECKING:
     from symrender_cg.pipeline import Translation
 
-LAYOUT: Final = 1
+LAYOUT: Final = 2
 """Counts the changes of what is written here, so that what an older version kept is not taken for up to date."""
 
 SUPPORT: Final = "support"
@@ -59,7 +59,10 @@ def places(kernel: str, texts: Mapping[str, str], manifest: str) -> dict[str, st
 
 
 def manifest_text(translation: Translation, *, command: str, numbers: Mapping[str, float] | None = None) -> str:
-    """manifest.json of a kernel: what it is, what its plan rests on, its inputs, its cost, how to remake it."""
+    """manifest.json of a kernel: what it is, what its plan rests on, its inputs, its cost, how to remake it.
+
+    Of the kernel of a scene also its parts, each with its operations by rate, and the shapes of its structure's fields.
+    """
     emitted, variant = translation.emitted, translation.variant
     own = [name for name in emitted.files if Path(name).stem == emitted.name]
     manifest = {
@@ -76,6 +79,7 @@ def manifest_text(translation: Translation, *, command: str, numbers: Mapping[st
                 "status": decision.status,
                 "reason": decision.reason,
                 "margin": decision.margin,
+                "bound": decision.bound,
             }
             for decision in translation.plan.decisions
         ],
@@ -83,10 +87,25 @@ def manifest_text(translation: Translation, *, command: str, numbers: Mapping[st
         "baked": dict(sorted(numbers.items())) if numbers is not None else {},
         "result_type": emitted.result_type,
         "operations": {rate: dict(sorted(counts.items())) for rate, counts in emitted.operations.items()},
+        **_scene_entries(translation),
         "files": own,
         "support": sorted(f"{SUPPORT}/{name}" for name in emitted.files if name not in own),
     }
     return json.dumps(manifest, indent=2, ensure_ascii=True) + "\n"
+
+
+def _scene_entries(translation: Translation) -> dict[str, Any]:
+    """What the manifest of a scene's kernel says beside that of one sphere's."""
+    if translation.plan.arrangement is None:
+        return {}
+    from symrender_cg.explain import part_operations
+
+    return {
+        "channels": 3 if "colour" in translation.plan.flags else 1,
+        "flags": sorted(translation.plan.flags),
+        "fields": [{"name": name, "shape": shape} for name, shape in translation.emitted.fields],
+        "parts": {name: by_rate for name, by_rate in part_operations(translation).items()},
+    }
 
 
 def outcomes(files: Mapping[str, str], folder: Path) -> tuple[Outcome, ...]:

@@ -303,7 +303,7 @@ def _compiled(
 ) -> Kernel | SceneKernel:
     chosen = variant(accuracy)
     require_kind(found, chosen, bake=bake)
-    require_format(found.scene, found, chosen.shading)
+    require_format(found, chosen.shading)
     root = Path(cache) if cache is not None else default_root()
     baked = tuple(sorted(numbers_of(found.scene).items())) if bake else ()
     key = (found.key, chosen.name, baked, portable, root)

@@ -44,8 +44,8 @@ and they are left out of the errors"""
 
 _DOUBT_SCENE = """
 in doubt: points that miss the bound, and where the field jumps within rounding (a shadow's or a tile's edge, an outline
-in a mirror, a gated highlight at the terminator) or rounding grows beyond the bound from mirror to mirror; they are left
-out of the errors"""
+in a mirror, a gated highlight at the terminator), rounding decides which of two surfaces is in front, or grows beyond
+the bound from mirror to mirror; they are left out of the errors"""
 
 
 def as_data(report: Report) -> dict[str, Any]:
@@ -111,7 +111,9 @@ def _print(report: Report) -> None:
         of_loop = ", ".join(f"{count} ({where})" for where, count in report.per_pixel_points.items())
         print(f"points of the per-pixel loop: {of_loop}")
     else:
-        print("wrong hits: points where another surface is seen than the nearest; errors are the largest of any channel")
+        print(
+            "wrong hits: points where another surface is seen than the nearest; errors are the largest of any channel"
+        )
 
 
 def _apart(difference: float | None) -> str:

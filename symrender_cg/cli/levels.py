@@ -15,14 +15,15 @@ from symrender_cg.scene import Scene
 def accuracies_for(scene: Scene, asked: Sequence[str] | str, *, bake: bool = False) -> tuple[str, ...]:
     """`all` -> every accuracy that the scene can have, the others named on stderr; a list -> that list.
 
-    Raises OutsidePlanError where a list asks for one that the scene cannot have, ArgumentError where it cannot be baked.
+    Raises OutsidePlanError where a list asks for one that the scene cannot have, ArgumentError for a scene that cannot
+    be baked.
     """
     found = plan(scene)
     possible = []
     for name in ACCURACIES if asked == "all" else asked:
         try:
             require_kind(found, variant(name), bake=bake)
-            require_format(scene, found, variant(name).shading)
+            require_format(found, variant(name).shading)
         except OutsidePlanError as refusal:
             if asked != "all":
                 raise

@@ -1,4 +1,4 @@
-"""`render`: a scene -> an image file, and its layers beside it, with a progress bar where it takes longer than a second.
+"""`render`: a scene -> an image file, and its layers beside it; a progress bar where it takes over a second.
 
 On a warm start: no sympy, no templates, no rich.
 """

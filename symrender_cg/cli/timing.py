@@ -1,4 +1,4 @@
-"""Quick measurements of drawings, side by side: enough to say what baking or an effect costs. Benchmarks are elsewhere."""
+"""Quick measurements of drawings, side by side: enough to say what baking or an effect costs."""
 
 from __future__ import annotations
 

@@ -247,7 +247,7 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         condition="bottom = top, or one background for all directions",
     ),
     Effect(
-        "colour", "colour", "two of three channels", optional=False, condition="every colour of the scene is one number"
+        "colour", "colour", "two of three channels", optional=False, condition="every colour of the scene is grey"
     ),
     Effect(
         "clip",

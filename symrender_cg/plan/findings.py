@@ -206,10 +206,10 @@ def _gradient(found: Examination) -> Iterator[Finding]:
 
 
 def _colour(found: Examination) -> Iterator[Finding]:
-    if found.measures.scene.channels == 3:
-        yield Finding(True, "a colour of the scene is (red, green, blue)")
+    if not found.measures.scene.is_grey:
+        yield Finding(True, "a colour of the scene is not grey")
     else:
-        yield Finding(False, "every colour of the scene is one number: one channel")
+        yield Finding(False, "every colour of the scene is grey: one channel")
 
 
 FINDERS: Final[dict[str, Finder]] = {

@@ -39,7 +39,7 @@ def scene_flags(scene: Scene, found: Arrangement, force: Collection[str] = ()) -
         "shadows": bool(found.blockers.size),
         "mirrors": found.bounces > 0,
         "gradient": isinstance(background, Gradient) and background.bottom != background.top,
-        "colour": scene.channels == 3,
+        "colour": not scene.is_grey,
     }
     return frozenset(name for name, holds in flags.items() if holds)
 

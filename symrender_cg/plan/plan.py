@@ -211,9 +211,8 @@ def plan(scene: Scene, *, force: Iterable[str] = (), aspect: float | None = None
     return arranged(frame, forced, aspect, max_error)
 
 
-def require_format(scene: Scene, found: Plan, shading: str) -> None:
-    """Raises OutsidePlanError where kernels that shade in this format are not proved right for the scene."""
-    del scene
+def require_format(found: Plan, shading: str) -> None:
+    """Raises OutsidePlanError where kernels that shade in this format are not proved right for the plan's scene."""
     if shading != "float32":
         return
     require_single_view(found.scene)

@@ -222,9 +222,9 @@ def _gradient(found: Examination) -> Tally:
 
 
 def _colour(found: Examination) -> Tally:
-    if found.measures.scene.channels == 3:
-        return Tally(True, "a colour of the scene is (red, green, blue)", 1)
-    return Tally(False, "every colour of the scene is one number: one channel", 1)
+    if not found.measures.scene.is_grey:
+        return Tally(True, "a colour of the scene is not grey", 1)
+    return Tally(False, "every colour of the scene is grey: one channel", 1)
 
 
 def _clip(found: Examination) -> Tally:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -70,13 +71,35 @@ def bind(
 ) -> Drawing:
     """A kernel and a plan that it was made for, with the numbers of the plan's scene."""
     if isinstance(kernel, SceneKernel):
-        numbers: Any = _prepared(kernel, plan, width, height, pixel, white)
+        numbers: Any = _prepared(kernel, _Same(plan), width, height, pixel, white)
     else:
         numbers = kernel.numbers(numbers_of(plan.scene))
     return Drawing(plan, kernel, numbers, pixel, white)
 
 
-def _prepared(kernel: SceneKernel, plan: Plan, width: int, height: int, pixel: float, white: float) -> Prepared:
-    assert plan.arrangement is not None, "a kernel of scenes is for plans with an arrangement"
-    numbers = scene_numbers(plan.scene, plan.arrangement, kernel.channels)
-    return kernel.prepare(numbers, width=width, height=height, pixel=pixel, white=white)
+class _Same:
+    """A plan as the key of a cache: equal to itself alone, so that no scene is compared with another."""
+
+    __slots__ = ("plan",)
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.plan is self.plan
+
+    def __hash__(self) -> int:
+        return id(self.plan)
+
+
+@lru_cache(maxsize=8)
+def _prepared(kernel: SceneKernel, same: _Same, width: int, height: int, pixel: float, white: float) -> Prepared:
+    """The tables of a scene, remembered: a scene is drawn more than once, and threads may share them."""
+    return kernel.prepare(_numbers(same, kernel.channels), width=width, height=height, pixel=pixel, white=white)
+
+
+@lru_cache(maxsize=8)
+def _numbers(same: _Same, channels: int) -> dict[str, Any]:
+    found = same.plan.arrangement
+    assert found is not None, "a kernel of scenes is for plans with an arrangement"
+    return scene_numbers(same.plan.scene, found, channels)

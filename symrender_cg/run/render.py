@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -146,7 +146,13 @@ def evaluate(
 
 def shape_of(scene: Scene, *points: int) -> tuple[int, ...]:
     """The shape of a scene's intensities at an array of points of that shape."""
-    return points if scene.channels == 1 else (*points, scene.channels)
+    channels = _channels(scene)
+    return points if channels == 1 else (*points, channels)
+
+
+@lru_cache(maxsize=256)
+def _channels(scene: Scene) -> int:
+    return scene.channels
 
 
 def _as_colour(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:

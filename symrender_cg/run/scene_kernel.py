@@ -26,7 +26,7 @@ class Prepared:
     keeps: tuple[Any, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SceneKernel:
     """A native kernel of a scene and how to call it.
 

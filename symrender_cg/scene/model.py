@@ -104,6 +104,11 @@ class Scene(Struct, frozen=True, forbid_unknown_fields=True, cache_hash=True):
         """3 when any colour of the scene is (red, green, blue), else 1: the image is (h, w, 3) or (h, w)."""
         return 3 if any(isinstance(colour, tuple) for colour in self._colours()) else 1
 
+    @property
+    def is_grey(self) -> bool:
+        """Whether the channels of every colour are equal: one channel is then all there is to compute."""
+        return all(not isinstance(c, tuple) or c[0] == c[1] == c[2] for c in self._colours())
+
     def _colours(self) -> Iterator[Colour]:
         """Every colour of the scene, each distinct material once."""
         if isinstance(self.background, Gradient):

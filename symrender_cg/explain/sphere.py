@@ -1,6 +1,6 @@
-"""What a kernel rests on, as data: plan, derivation, chosen forms, proved invariants, silhouette, operations.
+"""What the kernel of one sphere rests on: plan, derivation, chosen forms, proved invariants, silhouette, operations.
 
-Comes in: a Scene and an accuracy. Goes out: Explanation, frozen, of text and numbers: formulas as text and as LaTeX.
+Comes in: its translation. Goes out: Explanation, frozen, of text and numbers: formulas as text and as LaTeX.
 Never done here: printing, compiling, or a formula that is not the derivation's own.
 """
 
@@ -17,30 +17,16 @@ import sympy as sp
 from symrender_cg.derive import forms
 from symrender_cg.derive.exact import sign_tests
 from symrender_cg.derive.proofs import Invariant, prove_invariants
-from symrender_cg.derive.symbols import INPUTS, latex_names, symbol
-from symrender_cg.pipeline import translate
+from symrender_cg.derive.symbols import INPUTS, symbol
+from symrender_cg.explain.operations import swollen_operations
+from symrender_cg.explain.quantities import Quantity, latex_symbols, quantity
 from symrender_cg.plan.plan import Decision
 from symrender_cg.run.numbers import numbers_of
-from symrender_cg.scene import Scene
 
 if TYPE_CHECKING:
-    from symrender_cg.derive.program import ImageProgram
-    from symrender_cg.pipeline import Translation
+    from symrender_cg.pipeline import SphereTranslation
 
 CENTRED = "x^2 + y^2 = e^2 R^2 / (e^2 - R^2)"
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """One named quantity: its formula as text and as LaTeX, what it means, its source, the section it stands in."""
-
-    name: str
-    formula: str
-    latex_name: str
-    latex: str
-    meaning: str
-    source: str
-    section: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,18 +81,15 @@ class Explanation:
     operations: dict[str, dict[str, int]]
 
 
-def explain(scene: Scene, accuracy: str = "double") -> Explanation:
-    """The explanation of the kernel that a scene gets at an accuracy.
-
-    Raises ArgumentError for an unknown accuracy, OutsidePlanError for a scene that no plan covers.
-    """
-    translation = translate(scene, accuracy)
+def explain_sphere(translation: SphereTranslation) -> Explanation:
+    """The explanation of the kernel of one sphere; its numbers are those of the plan's scene."""
     plan, variant, image = translation.plan, translation.variant, translation.image
-    numbers = numbers_of(scene)
-    names = _latex_symbols(translation)
-    textbook = tuple(_quantity(d.name, d.value, d.meaning, d.source, d.section, names) for d in image.definitions)
-    own = {(definition.name, definition.value) for definition in image.definitions}
+    numbers = numbers_of(plan.scene)
     first = translation.passes[0].program
+    named = [(d.name, d.value) for d in image.definitions]
+    names = latex_symbols([*named, *((step.name, step.value) for step in first.steps)])
+    textbook = tuple(quantity(d.name, d.value, d.meaning, d.source, d.section, names) for d in image.definitions)
+    own = {(definition.name, definition.value) for definition in image.definitions}
     used = (forms.form(name) for name in variant.forms)
     fitting = [
         entry
@@ -117,7 +100,7 @@ def explain(scene: Scene, accuracy: str = "double") -> Explanation:
         kernel=translation.emitted.name,
         accuracy=variant.name,
         promise=variant.promise,
-        decisions=plan.decisions,
+        decisions=plan.decisions if plan.scene is plan.given else plan.summary,
         inputs=tuple(
             (row.name, row.latex, row.meaning, numbers[row.name])
             for row in INPUTS
@@ -127,7 +110,7 @@ def explain(scene: Scene, accuracy: str = "double") -> Explanation:
         guard=image.guard,
         forms=tuple(ChosenForm(entry.name, entry.removes, entry.source) for entry in fitting),
         chosen=_by_section(
-            _quantity(s.name, s.value, s.meaning, s.source, s.section, names)
+            quantity(s.name, s.value, s.meaning, s.source, s.section, names)
             for s in first.steps
             if (s.name, s.value) not in own
         ),
@@ -139,21 +122,6 @@ def explain(scene: Scene, accuracy: str = "double") -> Explanation:
     )
 
 
-def swollen_operations(image: ImageProgram) -> dict[str, int]:
-    """Operations of each named quantity, and of the `image`, written as one formula in the inputs (sympy's count).
-
-    Every definition is substituted into those that use it, the first one first: so each Max is built once.
-    """
-    closed: dict[sp.Symbol, sp.Expr] = {}
-    counts: dict[str, int] = {}
-    for definition in image.definitions:
-        closed[definition.symbol] = definition.value.xreplace(closed)
-        counts[definition.name] = int(sp.count_ops(closed[definition.symbol]))
-    # the Piecewise around shading and condition adds the comparisons alone
-    counts["image"] = counts[image.value] + int(sp.count_ops(image.condition()))
-    return counts
-
-
 def _by_section(quantities: Iterable[Quantity]) -> tuple[Quantity, ...]:
     """The quantities of one section together, sections in the order in which they begin."""
     groups: dict[str, list[Quantity]] = {}
@@ -162,28 +130,7 @@ def _by_section(quantities: Iterable[Quantity]) -> tuple[Quantity, ...]:
     return tuple(quantity for group in groups.values() for quantity in group)
 
 
-def _quantity(
-    name: str, value: sp.Basic, meaning: str, source: str, section: str, names: dict[sp.Symbol, str]
-) -> Quantity:
-    shown = names[symbol(name)]
-    return Quantity(name, str(value), shown, sp.latex(value, symbol_names=names), meaning, source, section)
-
-
-def _latex_symbols(translation: Translation) -> dict[sp.Symbol, str]:
-    """How every symbol of the derivation and of the chosen forms is set; a word is set upright, not as a product."""
-    named: list[tuple[str, sp.Basic]] = [(d.name, d.value) for d in translation.image.definitions]
-    named += [(step.name, step.value) for step in translation.passes[0].program.steps]
-    found = {symbol(name) for name, _ in named} | {s for _, value in named for s in value.free_symbols}
-    return {s: _latex_of(s.name) for s in sorted(found, key=str)} | latex_names()
-
-
-def _latex_of(name: str) -> str:
-    head, _, rest = name.partition("_")
-    shown = head if len(head) == 1 else rf"\mathrm{{{head}}}"
-    return shown if not rest else shown + rf"_{{\mathrm{{{rest.replace('_', ' ')}}}}}".replace(" ", r"\,")
-
-
-def _silhouette(translation: Translation, numbers: dict[str, float]) -> Silhouette:
+def _silhouette(translation: SphereTranslation, numbers: dict[str, float]) -> Silhouette:
     """The conic of the exact test of disc, its coefficients in exact rationals, rounded once for display."""
     test = sign_tests(translation.image)[0]
     powers = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0))
@@ -220,7 +167,7 @@ def _rounded(value: Fraction) -> float:
         return float("inf") if value > 0 else float("-inf")
 
 
-def _stages(translation: Translation) -> tuple[Step, ...]:
+def _stages(translation: SphereTranslation) -> tuple[Step, ...]:
     seconds = translation.seconds
     named, kernel = translation.image.operations(), sum(translation.program.operations().values())
     closed = swollen_operations(translation.image)["image"]
@@ -232,7 +179,7 @@ def _stages(translation: Translation) -> tuple[Step, ...]:
     )
 
 
-def _passes(translation: Translation) -> tuple[Step, ...]:
+def _passes(translation: SphereTranslation) -> tuple[Step, ...]:
     steps = []
     before = translation.image.operations()
     for stage in translation.passes:
