@@ -199,7 +199,7 @@ def compare(scene: Scene, seed: int, width: int, height: int, root: Path, *, own
     infinite = int((~np.isfinite(drawn["image"])).sum())
     refused, error_single, clear_single = False, 0.0, traced.doubt > DOUBT["single"]
     try:
-        require_format(found.scene, found, "float32")
+        require_format(found, "float32")
     except OutsidePlanError:
         refused = True
     else:

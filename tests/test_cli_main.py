@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from command_line import ROOT, Shell, in_a_process
 
-from symrender_cg import errors
+from symrender_cg import Scene, errors
 from symrender_cg.cli import doctor, main, render
 from symrender_cg.cli.console import Column, Table, counted, duration, listed, size
 from symrender_cg.version import VERSION
@@ -56,6 +56,10 @@ def test_help_lists_the_commands_and_the_exit_codes(shell: Shell) -> None:
         (("build", "--accuracy", "double,exact"), "'exact' is not known; expected some of"),
         (("check", "--points", "-1"), "expected a whole number from 0 up"),
         (("explain", "--latex", "--json"), "not allowed with argument"),
+        (("explain", "--findings", "shadow", "--ablate"), "not allowed with argument"),
+        (("explain", "--max-error", "-1"), "'-1' is not a tolerance; expected a number >= 0"),
+        (("explain", "--max-error", "nan"), "'nan' is not a tolerance"),
+        (("render", "--layers", "depth,colour"), "'colour' is not known; expected some of depth, normal"),
         (("doctor", "--clear"), "unrecognized arguments: --clear"),
     ],
 )
@@ -100,7 +104,7 @@ def test_debug_shows_the_traceback(capsys: pytest.CaptureFixture[str], words: tu
     assert main.main([*words, "-o", "x.png"]) == 2
     said = capsys.readouterr().err
     assert "Traceback (most recent call last)" in said
-    assert said.endswith("off_axis\n")
+    assert said.endswith(f"{Scene.builtin_names()[-1]}\n")
 
 
 def test_debug_by_environment_logs_what_the_pipeline_does(tmp_path: Path) -> None:
@@ -161,13 +165,25 @@ def test_scene_errors_name_the_place_and_exit_with_2(shell: Shell, tmp_path: Pat
 
 
 def test_scenes_that_no_plan_covers_exit_with_3(shell: Shell, tmp_path: Path) -> None:
-    two = tmp_path / "two.toml"
-    two.write_text("[[spheres]]\n[[spheres]]\ncenter = [3.0, 0.0, 0.0]\n")
-    for words in (("build", two), ("render", two, "-o", tmp_path / "a.png"), ("explain", two), ("check", two)):
+    far = tmp_path / "far.toml"
+    far.write_text("[camera]\neye = [0.0, 0.0, 1e200]\n[[spheres]]\n[[spheres]]\ncenter = [3.0, 0.0, 0.0]\n")
+    for words in (("build", far), ("render", far, "-o", tmp_path / "a.png"), ("explain", far), ("check", far)):
         answer = shell(*words)
         assert answer.code == 3
-        assert "2 spheres and 1 lights; kernels are derived for one sphere" in answer.err
-    assert [path.name for path in tmp_path.iterdir()] == ["two.toml"]
+        assert "spheres[0].radius: 1.0" in answer.err
+    assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
+
+
+@pytest.mark.parametrize("command", ["build", "render", "explain", "check"])
+def test_the_formula_of_one_sphere_is_refused_for_scenes_with_exit_code_3(
+    shell: Shell, tmp_path: Path, command: str
+) -> None:
+    place = {"build": ("--out", tmp_path), "render": ("-o", tmp_path / "a.png")}.get(command, ())
+    answer = shell(command, "two_spheres", "--accuracy", "literal", *place)
+    assert answer.code == 3
+    assert "'literal' is the formula of one sphere under one light" in answer.err
+    assert "use 'double' or 'single'" in answer.err
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_module_runs_as_a_program() -> None:

@@ -11,8 +11,8 @@ import pytest
 from command_line import LOADED_AFTER, Shell, in_a_process
 from PIL import Image
 
-from symrender_cg import Scene, render_image
-from symrender_cg.cli import render
+from symrender_cg import Scene, render_image, render_layers
+from symrender_cg.cli import layers, parser, progress, render
 
 
 @pytest.fixture
@@ -92,13 +92,14 @@ def test_list_names_each_built_in_scene_with_its_description(shell: Shell) -> No
     ("words", "text"),
     [
         ((), "-o FILE is missing"),
-        (("-o", "a.jpg"), "the extension '.jpg' names no image format; expected one of .png, .npy, .pfm"),
+        (("-o", "a.jpg"), "the extension '.jpg' names no image format; expected one of .png, .npy, .npz, .pfm"),
         (("-o", "a"), "the extension '' names no image format"),
-        (("-o", "a.png", "--no-clip"), "--no-clip: a .png cannot hold intensities above 1; write a .npy or .pfm"),
+        (("-o", "a.png", "--no-clip"), "--no-clip: a .png cannot hold intensities above 1; write a .npy, .npz or .pfm"),
         (("-o", "a.npy", "--bits", "16"), "bits: 16 has no meaning for .npy"),
         (("-o", "a.pfm", "--encoding", "linear"), "encoding: linear has no meaning for .pfm"),
         (("-o", "missing/a.png"), "its folder does not exist"),
         (("-o", "folder.png"), "is a folder"),
+        (("-o", "a.png", "--layers", "depth", "--backend", "numpy"), "leave --backend numpy out"),
         (("-o", "a.png", "--threads", "0"), "threads: 0 is not a number of threads"),
         (("-o", "a.png", "--size", "16777216x16777216"), "does not fit into memory; render a smaller one"),
     ],
@@ -131,17 +132,118 @@ def test_the_bar_shows_rows_on_a_terminal_after_a_second_and_not_before(monkeypa
 
     screen = Terminal()
     monkeypatch.setattr(sys, "stderr", screen)
-    with render.Progress(200) as progress:
-        progress.rows_done(50)
+    with progress.Progress(200, "rendering", "rows") as bar:
+        bar.done(50)
         assert screen.getvalue() == ""
-        monkeypatch.setattr(render, "BAR_AFTER_SECONDS", -1.0)
-        progress.rows_done(50)
-        progress.writing("a.png")
-    assert "of 200" in screen.getvalue()
+        monkeypatch.setattr(progress, "BAR_AFTER_SECONDS", -1.0)
+        bar.done(50)
+        bar.now("writing a.png")
+    assert "of 200 rows" in screen.getvalue()
 
 
 def test_no_bar_is_drawn_where_no_terminal_is(shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(render, "BAR_AFTER_SECONDS", -1.0)
+    monkeypatch.setattr(progress, "BAR_AFTER_SECONDS", -1.0)
     answer = shell("render", "-o", tmp_path / "a.npy", "--size", "16x16")
     assert answer.code == 0
     assert answer.err == ""
+
+
+SCENES = ("two_spheres", "mirrors")
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_scenes_are_rendered_bit_for_bit_as_by_render_image(
+    shell: Shell, tmp_path: Path, scene: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(render, "PIXELS_A_BLOCK", 300)
+    path = tmp_path / "a.npy"
+    assert shell("render", scene, "-o", path, "--size", "47x31", "--no-clip", "--threads", "2").code == 0
+    expected = render_image(scene, 47, 31, clip=False)
+    assert expected.ndim == (3 if scene == "mirrors" else 2)
+    assert np.array_equal(np.load(path), expected)
+
+
+def test_the_numpy_backend_renders_scenes_too(shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(render, "PIXELS_A_BLOCK", 300)
+    answer = shell("render", "mirrors", "-o", tmp_path / "a.npy", "--size", "31x20", "--backend", "numpy")
+    assert answer.code == 0
+    assert np.abs(np.load(tmp_path / "a.npy") - render_image("mirrors", 31, 20)).max() < 1e-11
+
+
+def test_colours_that_are_all_grey_are_written_as_rgb(shell: Shell, tmp_path: Path) -> None:
+    text = "[camera]\nhalf_height = 2.0\n[[spheres]]\n[spheres.material]\nambient = [0.25, 0.25, 0.25]\n"
+    (tmp_path / "grey.toml").write_text(text)
+    answer = shell("render", tmp_path / "grey.toml", "-o", tmp_path / "a.npy", "--size", "20x16")
+    assert answer.code == 0
+    image = np.load(tmp_path / "a.npy")
+    assert image.shape == (16, 20, 3)
+    assert np.array_equal(image, render_image(tmp_path / "grey.toml", 20, 16))
+    assert (image == image[..., :1]).all()
+
+
+@pytest.mark.parametrize("scene", ["chapter1", "mirrors"])
+def test_an_npz_holds_the_layers_of_render_layers(shell: Shell, tmp_path: Path, scene: str) -> None:
+    path = tmp_path / "a.npz"
+    answer = shell("render", scene, "-o", path, "--size", "40x30", "--layers", "all", "--no-clip")
+    assert answer.code == 0
+    expected = render_layers(scene, 40, 30)
+    with np.load(path) as held:
+        assert set(held) == set(expected)
+        assert all(np.array_equal(held[name], array) for name, array in expected.items())
+        names = ("background", "ambient", "reflected")
+        total = sum(held[name] for name in names) + held["diffuse"].sum(axis=0) + held["specular"].sum(axis=0)
+        assert np.abs(total - held["image"]).max() < 1e-14
+    assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
+
+
+def test_layers_stand_beside_the_image_a_file_each(shell: Shell, tmp_path: Path) -> None:
+    answer = shell("render", "lights", "-o", tmp_path / "a.npy", "--size", "24x18", "--layers", "depth,index,terms")
+    assert answer.code == 0
+    lights = range(len(Scene.builtin("lights").lights))
+    of_lights = {f"a-{term}-{light}.npy" for term in ("diffuse", "specular") for light in lights}
+    alone = {"a.npy", "a-depth.npy", "a-index.npy", "a-background.npy", "a-ambient.npy", "a-reflected.npy"}
+    assert {path.name for path in tmp_path.iterdir()} == alone | of_lights
+    found = render_layers("lights", 24, 18)
+    assert np.array_equal(np.load(tmp_path / "a-depth.npy"), found["depth"])
+    assert np.load(tmp_path / "a-index.npy").dtype == np.int32
+    assert np.array_equal(np.load(tmp_path / "a-specular-1.npy"), found["specular"][1])
+    assert all(str(tmp_path / name) in answer.out for name in alone | of_lights)
+
+
+def test_pictures_of_layers_show_what_they_say(shell: Shell, tmp_path: Path) -> None:
+    words = ("mirrors", "-o", tmp_path / "a.png", "--size", "60x45", "--layers", "depth,normal,index")
+    assert shell("render", *words).code == 0
+    found = render_layers("mirrors", 60, 45, layers=("depth", "normal", "index"))
+    seen = found["index"] >= 0
+    assert 0 < seen.sum() < seen.size
+    depth, normal, index = (np.asarray(Image.open(tmp_path / f"a-{name}.png")) for name in ("depth", "normal", "index"))
+    assert depth.max() == 255
+    assert ((depth > 0) == seen).all()
+    order = np.argsort(found["depth"][seen])
+    assert (np.diff(depth[seen][order].astype(int)) <= 0).all()
+    assert np.abs(normal[seen] / 127.5 - 1.0 - found["normal"][seen]).max() < 1.0 / 255.0 + 1e-12
+    assert (normal[~seen] == 0).all()
+    colours = {tuple(index[found["index"] == k][0].tolist()) for k in np.unique(found["index"])}
+    assert len(colours) == len(np.unique(found["index"]))
+    assert all((index[found["index"] == k] == index[found["index"] == k][0]).all() for k in np.unique(found["index"]))
+
+
+def test_pictures_of_nothing_are_black() -> None:
+    nothing = np.full((2, 3), np.inf)
+    assert (layers.depth_picture(nothing)[0] == 0.0).all()
+    assert (layers.normal_picture(np.zeros((2, 3, 3)))[0] == 0.0).all()
+    assert (layers.index_picture(np.full((2, 3), -1))[0] == 0.0).all()
+    assert (layers.depth_picture(np.full((2, 3), 7.0))[0] == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "chosen"),
+    [
+        (("all",), layers.LAYERS),
+        (("index", "depth"), ("depth", "index")),
+        (("terms",), ("background", "ambient", "reflected", "diffuse", "specular")),
+    ],
+)
+def test_names_of_layers_stand_for_those_of_render_layers(text: tuple[str, ...], chosen: tuple[str, ...]) -> None:
+    assert layers.chosen_layers(text) == chosen
+    assert parser.LAYERS == layers.LAYERS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from PIL import Image
 
 from symrender_cg.errors import ArgumentError
-from symrender_cg.output import image_format, quantise, replacing, srgb, write_image
+from symrender_cg.output import image_format, quantise, replacing, srgb, write_arrays, write_image, write_levels
 
+COLOURS = np.random.default_rng(5).uniform(-0.25, 1.25, (37, 53, 3))
 RAMP = np.linspace(-0.25, 1.25, 61 * 47).reshape(47, 61)
 
 
@@ -31,9 +33,8 @@ def pfm(path: Path) -> np.ndarray:
     """The image of a PFM as its definition reads: rows from the bottom, little endian where the scale is negative."""
     kind, size, scale, data = path.read_bytes().split(b"\n", 3)
     width, height = map(int, size.split())
-    assert kind == b"Pf"
     assert float(scale) == -1.0
-    return np.frombuffer(data, "<f4").reshape(height, width)[::-1]
+    return np.frombuffer(data, "<f4").reshape((height, width) if kind == b"Pf" else (height, width, 3))[::-1]
 
 
 def srgb_decoded(level: np.ndarray, white: int) -> np.ndarray:
@@ -131,7 +132,7 @@ def test_views_of_any_stride_are_written_as_they_look(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["out.jpg", "out", "out.png.txt"])
 def test_an_unknown_extension_is_refused_with_the_list(name: str) -> None:
-    with pytest.raises(ArgumentError, match=r"names no image format; expected one of \.png, \.npy, \.pfm"):
+    with pytest.raises(ArgumentError, match=r"names no image format; expected one of \.png, \.npy, \.npz, \.pfm"):
         image_format(name)
 
 
@@ -189,3 +190,80 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match=r"folder\.npy: cannot be written"):
         write_image(tmp_path / "folder.npy", RAMP)
     assert [path.name for path in tmp_path.iterdir()] == ["folder.npy"]
+
+
+def unpacked(path: Path) -> np.ndarray:
+    """The levels of an RGB PNG of 16 bits whose rows all have the filter 2 (up), read as the standard says."""
+    data, at, packed = path.read_bytes(), 8, b""
+    head = chunks(path)[b"IHDR"]
+    width, height, depth, kind = struct.unpack(">IIBB", head[:10])
+    assert (depth, kind) == (16, 2)
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        body = data[at + 4 : at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length : at + 12 + length]) == (zlib.crc32(body),)
+        packed += body[4:] if body[:4] == b"IDAT" else b""
+        at += 12 + length
+    rows = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, 1 + 6 * width)
+    assert (rows[:, 0] == 2).all()
+    return np.cumsum(rows[:, 1:], axis=0, dtype=np.uint8).view(">u2").reshape(height, width, 3)
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_rgb_png_holds_the_nearest_level_of_each_channel(tmp_path: Path, bits: int) -> None:
+    path = tmp_path / "a.png"
+    form = write_image(path, COLOURS, bits=bits, encoding="linear")
+    levels = unpacked(path) if bits == 16 else np.asarray(Image.open(path))
+    assert levels.shape == COLOURS.shape
+    assert np.abs(levels - (2**bits - 1) * np.clip(COLOURS, 0.0, 1.0)).max() <= 0.5
+    assert str(form) == f"{bits} bit RGB, linear"
+    assert chunks(path)[b"gAMA"] == (100000).to_bytes(4, "big")
+
+
+def test_a_deep_rgb_png_of_many_blocks_is_one_picture_that_pillow_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = tmp_path / "whole.png"
+    write_image(whole, COLOURS, bits=16)
+    monkeypatch.setattr("symrender_cg.output._PIXELS_A_BLOCK", 150)
+    blocks = tmp_path / "blocks.png"
+    write_image(blocks, COLOURS, bits=16)
+    assert np.array_equal(unpacked(whole), unpacked(blocks))
+    picture = Image.open(blocks)
+    assert (picture.mode, picture.size) == ("RGB", (53, 37))
+    assert np.abs(np.asarray(picture) - unpacked(blocks) / 257.0).max() <= 1.0
+
+
+def test_rgb_goes_through_npy_npz_and_pfm_unchanged(tmp_path: Path) -> None:
+    for suffix in (".npy", ".npz", ".pfm"):
+        form = write_image(tmp_path / f"a{suffix}", COLOURS)
+        assert "RGB, linear" in str(form)
+    assert np.array_equal(np.load(tmp_path / "a.npy"), COLOURS)
+    with np.load(tmp_path / "a.npz") as held:
+        assert list(held) == ["image"]
+        assert np.array_equal(held["image"], COLOURS)
+    assert np.array_equal(pfm(tmp_path / "a.pfm"), COLOURS.astype(np.float32))
+
+
+def test_arrays_of_any_kind_are_kept_by_name(tmp_path: Path) -> None:
+    arrays = {"image": RAMP, "index": np.arange(12, dtype=np.int32).reshape(3, 4), "depth": np.full((2, 2), np.inf)}
+    write_arrays(tmp_path / "a.npz", arrays)
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as held:
+        assert set(held) == set(arrays)
+        assert all(np.array_equal(held[name], array) and held[name].dtype == array.dtype for name, array in arrays.items())
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_levels_are_written_as_they_are(tmp_path: Path, dtype: type) -> None:
+    grey = np.arange(12, dtype=dtype).reshape(3, 4) * 20
+    write_levels(tmp_path / "a.png", grey)
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "a.png")).astype(int), grey)
+    assert b"sRGB" in chunks(tmp_path / "a.png")
+
+
+def test_an_rgb_intensity_without_a_level_is_named_with_its_channel(tmp_path: Path) -> None:
+    bad = COLOURS.copy()
+    bad[3, 4, 2] = np.nan
+    with pytest.raises(ArgumentError, match=r"values\[3, 4, 2\]: nan has no grey level"):
+        write_image(tmp_path / "a.png", bad)
+    assert not list(tmp_path.iterdir())

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -20,14 +20,13 @@ import pytest
 import sympy as sp
 
 from symrender_cg.derive import parts
-from symrender_cg.derive.forms import CosinePower
 from symrender_cg.derive.parts import Part, vector
 from symrender_cg.derive.symbols import symbol as S
 from symrender_cg.derive.symbols import symbols
 
 Squares = Mapping[sp.Symbol, sp.Expr]
-Rests = dict[str, list[sp.Expr]]
-"""What is left of each statement: numbers that are 0 where it holds."""
+Rests = dict[str, Callable[[], list[Any]]]
+"""What is left of each statement: expressions that are 0 where it holds."""
 
 BUILDERS: dict[str, Callable[[], Part]] = {
     "span": lambda: parts.sphere_part(near=False, mirrored=True),
@@ -87,9 +86,9 @@ def rests(difference: sp.Matrix, squares: Squares | None = None) -> list[sp.Expr
     return [rest(component, squares) for component in difference]
 
 
-def failing(found: Rests) -> set[str]:
-    """The statements that do not hold."""
-    return {statement for statement, left in found.items() if any(value != 0 for value in left)}
+def failing(found: Rests) -> Iterator[str]:
+    """The statements that do not hold, as they are met."""
+    return (statement for statement, left in found.items() if any(value != 0 for value in left()))
 
 
 def spoilt(of: Part, name: str, change: sp.Expr) -> Part:
@@ -127,57 +126,61 @@ def sphere_statements(of: Part) -> Rests:
     t = (M.dot(RAY) - RADIUS * facing) / RAY.dot(RAY)
     offset = ORIGIN + t * RAY - CENTER
     distance = closed(of, "hit_distance", "facing", "d_dot_d") / sp.sqrt(S("d_dot_d"))
-    found = {
-        "the nearer root is on the sphere": [rest(offset.dot(offset) - RADIUS**2, squares)],
-        "facing2 = disc / R^2": [rest(closed(of, "facing2", "row_half") - DISC / RADIUS**2, halves)],
-        "facing = sqrt(facing2)": [square_of(of, "facing", "facing2") - S("facing2")],
-        "|n| = 1": [rest(n.dot(n) - 1, squares)],
-        "n = (P - C) / R": rests(n - offset / RADIUS, squares),
-        "facing = -n.D": [rest(n.dot(RAY) + facing, squares)],
-        "mirror = D - 2 (n.D) n": rests(mirror - (RAY - 2 * n.dot(RAY) * n), squares),
-        "|mirror| = |D|": [rest(mirror.dot(mirror) - RAY.dot(RAY), squares)],
-        "hit_distance = t |D| / R": [rest(distance - t / RADIUS, squares)],
-        "d_dot_d = |D|^2": [rest(closed(of, "d_dot_d") - RAY.dot(RAY))],
-        "inv_d2 = 1 / |D|^2": [rest(closed(of, "inv_d2") * RAY.dot(RAY) - 1)],
+    found: Rests = {
+        "the nearer root is on the sphere": lambda: [rest(offset.dot(offset) - RADIUS**2, squares)],
+        "facing2 = disc / R^2": lambda: [rest(closed(of, "facing2", "row_half") - DISC / RADIUS**2, halves)],
+        "facing = sqrt(facing2)": lambda: [square_of(of, "facing", "facing2") - S("facing2")],
+        "|n| = 1": lambda: [rest(n.dot(n) - 1, squares)],
+        "n = (P - C) / R": lambda: rests(n - offset / RADIUS, squares),
+        "facing = -n.D": lambda: [rest(n.dot(RAY) + facing, squares)],
+        "mirror = D - 2 (n.D) n": lambda: rests(mirror - (RAY - 2 * n.dot(RAY) * n), squares),
+        "|mirror| = |D|": lambda: [rest(mirror.dot(mirror) - RAY.dot(RAY), squares)],
+        "hit_distance = t |D| / R": lambda: [rest(distance - t / RADIUS, squares)],
+        "d_dot_d = |D|^2": lambda: [rest(closed(of, "d_dot_d") - RAY.dot(RAY))],
+        "inv_d2 = 1 / |D|^2": lambda: [rest(closed(of, "inv_d2") * RAY.dot(RAY) - 1)],
     }
     if of.name == "near":
-        found["before_eye = m.D / R"] = [rest(closed(of, "before_eye") - M.dot(RAY) / RADIUS)]
+        found["before_eye = m.D / R"] = lambda: [rest(closed(of, "before_eye") - M.dot(RAY) / RADIUS)]
     return found
 
 
 @pytest.mark.parametrize("name", ["span", "near"])
 def test_a_sphere_s_normal_mirrored_ray_and_distance_are_those_of_the_nearer_root(name: str) -> None:
     found = sphere_statements(part(name))
-    assert failing(found) == set()
+    assert list(failing(found)) == []
     assert len(found) >= 11
+
+
+def _zero(difference: sp.Expr, squares: Squares) -> Callable[[], list[Any]]:
+    return lambda: [rest(difference, squares)]
 
 
 def span_statements(of: Part) -> Rests:
     """The row's ends are the zeros in x of disc; the rows' ends the zeros in y of its discriminant in x."""
     half, root = S("row_half"), sp.Symbol("root_of_alpha", nonnegative=True)
     halves = {half: square_of(of, "row_half")}
-    found = {
-        f"disc = 0 at {end}": [rest(DISC.subs(X, closed(of, end, "row_half")), halves)] for end in ("x_left", "x_right")
+    found: Rests = {
+        f"disc = 0 at {end}": _zero(DISC.subs(X, closed(of, end, "row_half")), halves) for end in ("x_left", "x_right")
     }
     alpha = closed(of, "alpha")
     discriminant = sp.Poly(sp.expand(DISC), X).discriminant()
     row_disc = closed(of, "row_disc")
     power = alpha + closed(of, "offset_x") ** 2
-    found["row_disc is the discriminant in x"] = [rest(discriminant - 4 * RADIUS**4 * power * row_disc)]
-    found["alpha = -(coefficient of x^2) / R^2"] = [
+    found["row_disc is the discriminant in x"] = lambda: [rest(discriminant - 4 * RADIUS**4 * power * row_disc)]
+    found["alpha = -(coefficient of x^2) / R^2"] = lambda: [
         rest(sp.Poly(sp.expand(DISC), X).coeff_monomial(X**2) + RADIUS**2 * alpha)
     ]
     for end, sign in (("row_low", -1), ("row_high", 1)):
         row = closed(of, end, "alpha").xreplace({sp.sqrt(S("alpha")): root})
         assert row.has(root)
-        found[f"row_disc = 0 at {end}"] = [rest(row_disc.subs(Y, row), {root: alpha})]
+        found[f"row_disc = 0 at {end}"] = _zero(row_disc.subs(Y, row), {root: alpha})
         slope = sp.diff(row.subs(S("alpha"), root**2), root) * sign
-        found[f"{end} on its side"] = [rest(slope - EYE / ((M[2] ** 2 - RADIUS**2) / RADIUS**2))]
+        found[f"{end} on its side"] = _zero(slope - EYE / ((M[2] ** 2 - RADIUS**2) / RADIUS**2), {})
     return found
 
 
 def test_a_span_s_ends_and_rows_are_those_of_the_silhouette() -> None:
-    assert failing(span_statements(part("span"))) == set()
+    assert list(failing(span_statements(part("span")))) == []
 
 
 def random_spheres(count: int) -> list[dict[str, Any]]:
@@ -248,14 +251,14 @@ def light_statements(of: Part) -> Rests:
     at = {S("nearness"): sp.Integer(1)} | to_light
     parallel = {S("nearness"): sp.Integer(0)}
     return {
-        "R w = L - P": rests(RADIUS * w.xreplace(at) - (LIGHT - (CENTER + RADIUS * P))),
-        "w = lamp in parallel": rests(w.xreplace(parallel) - LAMP),
-        "w2 = |w|^2": [rest(closed(of, "w2") - w.dot(w))],
+        "R w = L - P": lambda: rests(RADIUS * w.xreplace(at) - (LIGHT - (CENTER + RADIUS * P))),
+        "w = lamp in parallel": lambda: rests(w.xreplace(parallel) - LAMP),
+        "w2 = |w|^2": lambda: [rest(closed(of, "w2") - w.dot(w))],
     }
 
 
 def test_w_leads_from_the_point_to_the_light_or_along_the_parallel_rays() -> None:
-    assert failing(light_statements(part("reach"))) == set()
+    assert list(failing(light_statements(part("reach")))) == []
 
 
 def test_a_light_in_parallel_is_the_limit_of_a_point_light_ever_farther_away() -> None:
@@ -275,15 +278,15 @@ def shading_statements(of: Part) -> Rests:
     direction = W / length
     r = 2 * N.dot(direction) * N - direction
     n_dot_l = closed(of, "n_dot_l").xreplace({S("w2"): length**2}).replace(sp.sqrt(length**-2), 1 / length)
-    found = {"n.l": [rest(n_dot_l - N.dot(direction), lengths)]}
+    found: Rests = {"n.l": lambda: [rest(n_dot_l - N.dot(direction), lengths)]}
     if of.name == "glossy":
-        found["w.mirror = (r.v) |w| |D|"] = [
+        found["w.mirror = (r.v) |w| |D|"] = lambda: [
             rest(closed(of, "w_dot_mirror").xreplace(bent) - r.dot(-ray) * length, lengths)
         ]
         r_dot_v2 = r.dot(-ray) ** 2 / ray.dot(ray)
         cos2, sin2 = (closed(of, name).xreplace({S("w2"): W.dot(W)}).xreplace(bent) for name in ("cos2", "sin2"))
-        found["cos2 = (r.v)^2"] = [rest(cos2 - r_dot_v2, lengths)]
-        found["sin2 = 1 - (r.v)^2"] = [_unit_rest(sin2 - (1 - r_dot_v2), lengths, unit)]
+        found["cos2 = (r.v)^2"] = lambda: [rest(cos2 - r_dot_v2, lengths)]
+        found["sin2 = 1 - (r.v)^2"] = lambda: [_unit_rest(sin2 - (1 - r_dot_v2), lengths, unit)]
     return found
 
 
@@ -295,7 +298,7 @@ def _unit_rest(difference: sp.Expr, lengths: Squares, unit: Squares) -> sp.Expr:
 
 @pytest.mark.parametrize("name", ["matte", "glossy"])
 def test_cosine_and_highlight_are_phong_s(name: str) -> None:
-    assert failing(shading_statements(part(name))) == set()
+    assert list(failing(shading_statements(part(name)))) == []
 
 
 def values(of: Part, **given: Any) -> dict[str, Any]:
@@ -325,14 +328,12 @@ def test_shading_ends_where_the_light_is_below_the_horizon_and_x_to_the_0_is_1(
     assert mpmath.almosteq(found["lobe"], lobe, abs_eps=1e-15)
 
 
-@pytest.mark.parametrize("shininess", [0, 1, 32])
-def test_a_light_at_the_point_itself_adds_nothing(shininess: float) -> None:
+def test_a_light_at_the_point_itself_adds_nothing() -> None:
     """Only the branches of w2 > 0 are asked: what stands behind them is never reached."""
     for name, result in (("matte", "cosine"), ("glossy", "cosine"), ("glossy", "lobe")):
         value = next(d.value for d in part(name).definitions if d.name == result)
         assert value.subs(S("w2"), 0) == 0
         assert value.subs(S("w2"), sp.Rational(1, 7)) != 0
-    assert CosinePower(sp.Integer(1), sp.Integer(0), sp.Integer(shininess)).has(CosinePower)
 
 
 def fading_statements(of: Part) -> Rests:
@@ -343,15 +344,15 @@ def fading_statements(of: Part) -> Rests:
     distance = r * length
     fading = closed(of, "fading", "w_length").xreplace(given)
     return {
-        "fading = 1 / (a + b l + c l^2)": [rest(fading * (a + b * distance + c * distance**2) - 1)],
-        "w_length^2 = |w|^2, no more than the farthest": [
+        "fading = 1 / (a + b l + c l^2)": lambda: [rest(fading * (a + b * distance + c * distance**2) - 1)],
+        "w_length^2 = |w|^2, no more than the farthest": lambda: [
             square_of(of, "w_length").subs({S("w2"): w2, S("farthest2"): 25}) - min(w2, 25) for w2 in (0, 9, 25, 10**40)
         ],
     }
 
 
 def test_a_light_fades_with_the_distance_in_scene_units() -> None:
-    assert failing(fading_statements(part("fading"))) == set()
+    assert list(failing(fading_statements(part("fading")))) == []
 
 
 # ------------------------------------------------------------------------------------------------------------ shadows
@@ -367,16 +368,16 @@ def shadow_statements(of: Part) -> Rests:
     at = {S("w2"): W.dot(W)}
     inside2, toward = closed(of, "inside2").xreplace(at), closed(of, "toward").xreplace(at)
     return {
-        "toward = s_0 |w|^2": [rest(toward - nearest[0] * W.dot(W))],
-        "inside2 = |w|^2 (ratio^2 - distance^2 at s_0)": [
+        "toward = s_0 |w|^2": lambda: [rest(toward - nearest[0] * W.dot(W))],
+        "inside2 = |w|^2 (ratio^2 - distance^2 at s_0)": lambda: [
             rest(inside2 - W.dot(W) * (S("ratio2") - square.subs(s, nearest[0])))
         ],
-        "the distance is least there": [rest(sp.diff(square, s, 2) - 2 * W.dot(W))],
+        "the distance is least there": lambda: [rest(sp.diff(square, s, 2) - 2 * W.dot(W))],
     }
 
 
 def test_a_shadow_falls_where_the_nearest_point_of_the_way_lies_in_the_ball() -> None:
-    assert failing(shadow_statements(part("shadow"))) == set()
+    assert list(failing(shadow_statements(part("shadow")))) == []
 
 
 def is_dark(of: Part, p: list[Fraction], w: list[Fraction], gap: list[Fraction], ratio: Fraction, far: Any) -> bool:
@@ -404,7 +405,7 @@ def meets(p: list[Fraction], w: list[Fraction], gap: list[Fraction], ratio: Frac
 
 
 def test_a_shadow_is_decided_as_by_the_distance_of_segment_and_ball() -> None:
-    """Points and lights on a grid of rationals, outside the ball and inside, in parallel; each kind of answer occurs."""
+    """Points and lights on a grid of rationals, outside the ball and inside; in parallel; each answer occurs."""
     chance, answers = random.Random(11), {False: 0, True: 0}
     of = part("shadow")
     for _ in range(400):
@@ -422,7 +423,7 @@ def test_a_shadow_is_decided_as_by_the_distance_of_segment_and_ball() -> None:
             assert dark or to_lamp > 0
             answers[dark] += 1
         assert is_dark(of, p, w, gap, ratio, sp.oo) == meets(p, w, gap, ratio, None)
-    assert min(answers.values()) > 60
+    assert min(answers.values()) > 20
 
 
 # -------------------------------------------------------------------------------------------------------------- plane
@@ -438,20 +439,20 @@ def plane_statements(of: Part) -> Rests:
     point = ORIGIN + height * p
     n = closed_vector(of, "n")
     return {
-        "P on the plane": [rest(PLANE.dot(point - ORIGIN) + height)],
-        "P on the ray": rests((point - ORIGIN).cross(RAY)),
-        "in front of the eye where descent > 0": [rest(p.dot(RAY) * closed(of, "descent") - RAY.dot(RAY))],
-        "hit_distance = |P - E| / h": [rest(closed(of, "hit_distance") ** 2 - p.dot(p))],
-        "n is the plane's": rests(n - PLANE),
-        "descent = -n.D": [rest(closed(of, "descent") + n.dot(RAY))],
-        "mirror = D - 2 (n.D) n": rests(mirror - (RAY - 2 * n.dot(RAY) * n)),
-        "|mirror| = |D|": [rest(mirror.dot(mirror) - RAY.dot(RAY), UNIT)],
-        "inv_d2 = 1 / |D|^2": [rest(closed(of, "inv_d2") * RAY.dot(RAY) - 1)],
+        "P on the plane": lambda: [rest(PLANE.dot(point - ORIGIN) + height)],
+        "P on the ray": lambda: rests((point - ORIGIN).cross(RAY)),
+        "in front of the eye where descent > 0": lambda: [rest(p.dot(RAY) * closed(of, "descent") - RAY.dot(RAY))],
+        "hit_distance = |P - E| / h": lambda: [rest(closed(of, "hit_distance") ** 2 - p.dot(p))],
+        "n is the plane's": lambda: rests(n - PLANE),
+        "descent = -n.D": lambda: [rest(closed(of, "descent") + n.dot(RAY))],
+        "mirror = D - 2 (n.D) n": lambda: rests(mirror - (RAY - 2 * n.dot(RAY) * n)),
+        "|mirror| = |D|": lambda: [rest(mirror.dot(mirror) - RAY.dot(RAY), UNIT)],
+        "inv_d2 = 1 / |D|^2": lambda: [rest(closed(of, "inv_d2") * RAY.dot(RAY) - 1)],
     }
 
 
 def test_a_point_of_the_plane_lies_on_the_plane_and_on_the_ray() -> None:
-    assert failing(plane_statements(part("plane"))) == set()
+    assert list(failing(plane_statements(part("plane")))) == []
 
 
 def test_tiles_are_the_parity_of_the_sum_of_floors() -> None:
@@ -476,86 +477,86 @@ def test_tiles_are_the_parity_of_the_sum_of_floors() -> None:
 
 # ------------------------------------------------------------------------------------------------------------ mirrors
 
-OF, TO = vector("of"), vector("to")
+TO = vector("to")
 R_OF, R_TO = sp.symbols("r_of r_to", positive=True)
-LINK = dict(zip(vector("link"), (TO - OF) / R_TO, strict=True)) | {S("shrink"): R_OF / R_TO, S("reach"): R_TO}
-"""How the kernel sets them: from a receiver of unit r_of at `of` to a sphere of radius r_to at `to`."""
+LINK = dict(zip(vector("link"), TO / R_TO, strict=True)) | {S("shrink"): R_OF / R_TO, S("reach"): R_TO}
+"""How the kernel sets them: from a receiver of unit r_of at the origin to a sphere of radius r_to at `to`."""
 
 ROOT = sp.Symbol("root", nonnegative=True)
 
 
 def echo_disc() -> sp.Expr:
-    """A quarter of the discriminant of |P + t d - C|^2 = R^2 in t, over R^2, for P = of + r_of p."""
+    """A quarter of the discriminant of |P + t d - C|^2 = R^2 in t, over R^2, for P = r_of p."""
     t = sp.Symbol("t")
-    away = OF + R_OF * P + t * MIRROR - TO
+    away = R_OF * P + t * MIRROR - TO
     quadratic = sp.Poly(sp.expand(away.dot(away) - R_TO**2), t)
     return sp.expand(quadratic.discriminant() / (4 * R_TO**2))
 
 
 def echo_statements(of: Part) -> Rests:
     """`echo`: where P + t d meets the sphere, by the general quadratic."""
-    point = OF + R_OF * P
+    point = R_OF * P
     squares = {ROOT: echo_disc()}
     disc, ahead = closed(of, "disc").xreplace(LINK), closed(of, "ahead").xreplace(LINK)
     t = closed(of, "t", "facing").xreplace(LINK).xreplace({S("facing"): ROOT})
-    away = point + t * MIRROR - TO
     nearer = ((TO - point).dot(MIRROR) - R_TO * ROOT) / MIRROR.dot(MIRROR)
+    away = point + nearer * MIRROR - TO
     return {
-        "disc is the quadratic's": [rest(disc - echo_disc())],
-        "facing = sqrt(disc)": [square_of(of, "facing", "disc") - S("disc")],
-        "ahead = (C - P).d / R": [rest(ahead - (TO - point).dot(MIRROR) / R_TO)],
-        "P + t d on the sphere": [rest(away.dot(away) - R_TO**2, squares)],
-        "t is the nearer root": [rest(t - nearer, squares)],
+        "disc is the quadratic's": lambda: [rest(disc - echo_disc())],
+        "facing = sqrt(disc)": lambda: [square_of(of, "facing", "disc") - S("disc")],
+        "ahead = (C - P).d / R": lambda: [rest(ahead - (TO - point).dot(MIRROR) / R_TO)],
+        "t is the nearer root": lambda: [rest(t - nearer, squares)],
+        "P + t d on the sphere": lambda: [rest(away.dot(away) - R_TO**2, squares)],
     }
 
 
 def test_a_mirrored_ray_meets_a_sphere_where_the_quadratic_says() -> None:
-    assert failing(echo_statements(part("echo"))) == set()
+    assert list(failing(echo_statements(part("echo")))) == []
 
 
 def arrival_statements(of: Part) -> Rests:
     """`arrival`: the normal at that point, and the ray mirrored there."""
-    point = OF + R_OF * P
+    point = R_OF * P
     squares = {ROOT: echo_disc()}
     to_root = {S("facing"): ROOT}
     n, onward = (closed_vector(of, stem, "facing").xreplace(LINK).xreplace(to_root) for stem in ("n", "next"))
     t = ((TO - point).dot(MIRROR) - R_TO * ROOT) / MIRROR.dot(MIRROR)
     return {
-        "n = (P + t d - C) / R": rests(n - (point + t * MIRROR - TO) / R_TO, squares),
-        "|n| = 1": [rest(n.dot(n) - 1, squares)],
-        "facing = -n.d": [rest(n.dot(MIRROR) + ROOT, squares)],
-        "next = d - 2 (n.d) n": rests(onward - (MIRROR - 2 * n.dot(MIRROR) * n), squares),
-        "|next| = |d|": [rest(onward.dot(onward) - MIRROR.dot(MIRROR), squares)],
-        "inv_d2 = 1 / |d|^2": [rest(closed(of, "inv_d2") * MIRROR.dot(MIRROR) - 1)],
-        "facing = sqrt(disc)": [rest(square_of(of, "facing").xreplace(LINK) - echo_disc())],
+        "n = (P + t d - C) / R": lambda: rests(n - (point + t * MIRROR - TO) / R_TO, squares),
+        "|n| = 1": lambda: [rest(n.dot(n) - 1, squares)],
+        "facing = -n.d": lambda: [rest(n.dot(MIRROR) + ROOT, squares)],
+        "next = d - 2 (n.d) n": lambda: rests(onward - (MIRROR - 2 * n.dot(MIRROR) * n), squares),
+        "|next| = |d|": lambda: [rest(onward.dot(onward) - MIRROR.dot(MIRROR), squares)],
+        "inv_d2 = 1 / |d|^2": lambda: [rest(closed(of, "inv_d2") * MIRROR.dot(MIRROR) - 1)],
+        "facing = sqrt(disc)": lambda: [rest(square_of(of, "facing").xreplace(LINK) - echo_disc())],
     }
 
 
 def test_where_a_mirrored_ray_arrives_the_normal_has_length_1_and_mirrors_it_once_more() -> None:
-    assert failing(arrival_statements(part("arrival"))) == set()
+    assert list(failing(arrival_statements(part("arrival")))) == []
 
 
 def echo_plane_statements(of: Part) -> Rests:
-    """`echo_plane`: P + t d on the plane n.(X - E) = -h, for P = of + r_of p."""
+    """`echo_plane`: P + t d on the plane n.(X - E) = -h, for P = r_of p."""
     height, eye = S("height"), vector("e")
-    start = {S(f"origin_{axis}"): (OF[k] - eye[k]) / height for k, axis in enumerate("xyz")}
+    start = {S(f"origin_{axis}"): -eye[k] / height for k, axis in enumerate("xyz")}
     start[S("scale")] = R_OF / height
-    point = OF + R_OF * P
+    point = R_OF * P
     t = closed(of, "t").xreplace(start)
     foot, onward = closed_vector(of, "foot").xreplace(start), closed_vector(of, "next").xreplace(start)
     hit = point + t * MIRROR
     return {
-        "P + t d on the plane": [rest(PLANE.dot(hit - eye) + height)],
-        "foot = (P + t d - E) / h": rests(foot - (hit - eye) / height),
-        "descent = -n.d": [rest(closed(of, "descent") + PLANE.dot(MIRROR))],
-        "next = d - 2 (n.d) n": rests(onward - (MIRROR - 2 * PLANE.dot(MIRROR) * PLANE)),
-        "|next| = |d|": [rest(onward.dot(onward) - MIRROR.dot(MIRROR), UNIT)],
-        "inv_d2 = 1 / |d|^2": [rest(closed(of, "inv_d2") * MIRROR.dot(MIRROR) - 1)],
+        "P + t d on the plane": lambda: [rest(PLANE.dot(hit - eye) + height)],
+        "foot = (P + t d - E) / h": lambda: rests(foot - (hit - eye) / height),
+        "descent = -n.d": lambda: [rest(closed(of, "descent") + PLANE.dot(MIRROR))],
+        "next = d - 2 (n.d) n": lambda: rests(onward - (MIRROR - 2 * PLANE.dot(MIRROR) * PLANE)),
+        "|next| = |d|": lambda: [rest(onward.dot(onward) - MIRROR.dot(MIRROR), UNIT)],
+        "inv_d2 = 1 / |d|^2": lambda: [rest(closed(of, "inv_d2") * MIRROR.dot(MIRROR) - 1)],
     }
 
 
 def test_a_mirrored_ray_meets_the_plane_where_it_lies() -> None:
-    assert failing(echo_plane_statements(part("echo_plane"))) == set()
+    assert list(failing(echo_plane_statements(part("echo_plane")))) == []
 
 
 # --------------------------------------------------------------------------------------------------------- background
@@ -578,15 +579,15 @@ def gradient_statements(of: Part) -> Rests:
     straight_down = along(-k * up)[1].xreplace({length: k})
     level = along(up.cross(d))[1]
     return {
-        "(2 s - 1) |d| = up.d": [rest((2 * rooted - 1) * length - up.dot(d))],
-        "1 straight up": [rest(straight_up - 1, unit)],
-        "0 straight down": [rest(straight_down, unit)],
-        "1/2 on the horizon": [rest(level - sp.Rational(1, 2))],
+        "(2 s - 1) |d| = up.d": lambda: [rest((2 * rooted - 1) * length - up.dot(d))],
+        "1 straight up": lambda: [rest(straight_up - 1, unit)],
+        "0 straight down": lambda: [rest(straight_down, unit)],
+        "1/2 on the horizon": lambda: [rest(level - sp.Rational(1, 2))],
     }
 
 
 def test_the_background_is_the_bottom_s_straight_down_and_the_top_s_straight_up() -> None:
-    assert failing(gradient_statements(part("gradient"))) == set()
+    assert list(failing(gradient_statements(part("gradient")))) == []
 
 
 # --------------------------------------------------------------------------------------------------- proofs can fail
@@ -643,12 +644,12 @@ SPOILT = [
 
 @pytest.mark.parametrize(("name", "quantity", "change"), SPOILT, ids=[f"{n}.{q}" for n, q, _ in SPOILT])
 def test_a_part_that_is_wrong_is_seen_to_be(name: str, quantity: str, change: sp.Expr) -> None:
-    assert failing(STATEMENTS[name](spoilt(part(name), quantity, change)))
+    assert any(failing(STATEMENTS[name](spoilt(part(name), quantity, change))))
 
 
 def test_a_span_whose_rows_are_wrong_is_seen_to_be() -> None:
     for quantity in ("row_low", "row_high", "alpha"):
-        assert failing(span_statements(spoilt(part("span"), quantity, LITTLE))), quantity
+        assert any(failing(span_statements(spoilt(part("span"), quantity, LITTLE)))), quantity
 
 
 def test_every_part_is_stated_and_defines_all_that_it_gives() -> None:

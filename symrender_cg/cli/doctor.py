@@ -27,6 +27,9 @@ PACKAGES = (
     ("rich", "tables and progress on a terminal"),
 )
 
+LOOPING_SCENE = "mirrors"
+"""The built-in scene whose kernel has the most loops."""
+
 
 @dataclass(frozen=True, slots=True)
 class Loop:
@@ -62,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def kernel_loops(toolchain: Toolchain, *, portable: bool) -> tuple[Loop, ...]:
-    """The vectorised loops of Chapter 1's kernels, one of each accuracy, as the compiler reports them. Compiles each.
+    """The vectorised loops of Chapter 1's kernels and of a scene's, as the compiler reports them. Compiles each.
 
     Raises CompileError.
     """
@@ -71,8 +74,9 @@ def kernel_loops(toolchain: Toolchain, *, portable: bool) -> tuple[Loop, ...]:
     from symrender_cg.scene import Scene
 
     loops: list[Loop] = []
-    for accuracy in ACCURACIES:
-        emitted = translate(Scene.chapter1(), accuracy).emitted
+    asked = [(Scene.chapter1(), accuracy) for accuracy in ACCURACIES]
+    for scene, accuracy in (*asked, (Scene.builtin(LOOPING_SCENE), "double")):
+        emitted = translate(scene, accuracy).emitted
         own = f"{emitted.name}.c"
         lines = emitted.files[own].splitlines()
         found = vectorisation.report(emitted.files, toolchain=toolchain, portable=portable)

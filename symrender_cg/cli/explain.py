@@ -1,183 +1,70 @@
-"""`explain`: an Explanation as text, as a LaTeX document, or as JSON."""
+"""`explain`: what a kernel rests on as text, as a LaTeX document, or as JSON; findings; what each effect costs."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
-from collections.abc import Iterator
 from typing import Any
 
-from symrender_cg.cli.console import Column, Table, duration
-from symrender_cg.cli.latex import document
-from symrender_cg.explain import CENTRED, Explanation, Quantity, explain
-from symrender_cg.scene import load_scene
+from symrender_cg.cli import explain_scene, explain_sphere
+from symrender_cg.cli.derivation import finding_data, print_findings
+from symrender_cg.errors import ArgumentError
+from symrender_cg.scene import Scene, load_scene
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Prints the explanation in the form that is asked for."""
-    found = explain(load_scene(arguments.scene), arguments.accuracy)
-    if arguments.json:
-        print(json.dumps(as_data(found), indent=2, allow_nan=False))
-    elif arguments.latex:
+    """Prints what is asked for in the form that is asked for."""
+    scene = load_scene(arguments.scene)
+    if arguments.latex and (arguments.ablate or arguments.findings):
+        raise ArgumentError("--latex: findings and ablations are printed as text or as --json; leave --latex out")
+    if arguments.ablate:
+        return _ablate(scene, arguments)
+    if arguments.findings:
+        return _findings(scene, arguments)
+    from symrender_cg.explain import Explanation, explain
+
+    width, height = arguments.size
+    found = explain(scene, arguments.accuracy, aspect=width / height, max_error=arguments.max_error)
+    if arguments.latex:
+        from symrender_cg.cli.latex import document
+
         print(document(found), end="")
+    elif isinstance(found, Explanation):
+        _out(explain_sphere.as_data(found)) if arguments.json else explain_sphere.show(found)
     else:
-        _print(found)
+        _out(explain_scene.as_data(found)) if arguments.json else explain_scene.show(found)
     return 0
 
 
-def as_data(found: Explanation) -> dict[str, Any]:
-    """The explanation as what JSON holds; numbers beyond float64 become null."""
+def _ablate(scene: Scene, arguments: argparse.Namespace) -> int:
+    """Prints the table, and only then raises AccuracyError where an effect that was left out changes a pixel."""
+    from symrender_cg.cli import ablation
 
-    def quantity(q: Quantity) -> dict[str, str]:
-        return {
-            "name": q.name,
-            "formula": q.formula,
-            "latex": f"{q.latex_name} = {q.latex}",
-            "meaning": q.meaning,
-            "source": q.source,
-            "section": q.section,
-        }
-
-    def steps(entries: tuple[Any, ...]) -> list[dict[str, Any]]:
-        return [{"name": s.name, "seconds": s.seconds, "before": s.before, "after": s.after} for s in entries]
-
-    silhouette = found.silhouette
-    return {
-        "kernel": found.kernel,
-        "accuracy": found.accuracy,
-        "promise": found.promise,
-        "plan": [
-            {
-                "effect": d.effect.name,
-                "title": d.effect.title,
-                "status": d.status,
-                "reason": d.reason,
-                "margin": d.margin,
-                "leaves_out": None if d.needed else d.effect.removes,
-            }
-            for d in found.decisions
-        ],
-        "inputs": [
-            {"name": name, "latex": latex, "meaning": text, "value": v} for name, latex, text, v in found.inputs
-        ],
-        "textbook": [quantity(q) for q in found.textbook],
-        "hit_where": [condition(name) for name in found.guard],
-        "forms": [{"name": f.name, "removes": f.removes, "source": f.source} for f in found.forms],
-        "chosen": [quantity(q) for q in found.chosen],
-        "invariants": [
-            {"name": i.name, "statement": i.statement, "holds": i.holds, "detail": i.detail} for i in found.invariants
-        ],
-        "silhouette": {
-            "equation": silhouette.equation,
-            "coefficients": {
-                power: value if math.isfinite(value) else None
-                for power, value in zip(("x2", "xy", "y2", "x", "y", "1"), silhouette.coefficients, strict=True)
-            },
-            "kind": silhouette.kind,
-            "rho": silhouette.rho,
-        },
-        "stages": steps(found.stages),
-        "passes": steps(found.passes),
-        "operations": found.operations,
-    }
+    found = ablation.measured(scene, arguments.accuracy, arguments.size, arguments.max_error)
+    if arguments.json:
+        _out(ablation.as_data(found))
+    else:
+        ablation.show(found)
+    found.require()
+    return 0
 
 
-def condition(name: str) -> str:
-    """The condition on a guarded quantity, as text."""
-    return f"{name} >= 0" if name == "disc" else f"{name} > 0"
+def _findings(scene: Scene, arguments: argparse.Namespace) -> int:
+    from symrender_cg.plan.effects import EFFECTS
+    from symrender_cg.plan.plan import plan
+
+    names = [entry.name for entry in EFFECTS]
+    if arguments.findings not in names:
+        raise ArgumentError(f"--findings: {arguments.findings!r} is no effect; expected one of {', '.join(names)}")
+    width, height = arguments.size
+    findings = plan(scene, aspect=width / height, max_error=arguments.max_error).findings(arguments.findings)
+    if arguments.json:
+        data = {"effect": arguments.findings, "findings": [finding_data(finding) for finding in findings]}
+        _out(data)
+    else:
+        print_findings(findings)
+    return 0
 
 
-def _print(found: Explanation) -> None:
-    print(f'{found.kernel}: accuracy "{found.accuracy}", promise: {found.promise}')
-    _head("plan: which effects can change this image")
-    table = Table((Column(""), Column("effect"), Column("why")))
-    for decision in found.decisions:
-        why = decision.reason if decision.needed else f"{decision.reason}. Leaves out: {decision.effect.removes}"
-        table.add("in" if decision.needed else "out", decision.effect.title, why)
-    table.show()
-
-    _head("inputs, in the camera's frame")
-    table = Table((Column("name"), Column("value", right=True), Column("meaning")))
-    for name, _, meaning, value in found.inputs:
-        table.add(name, f"{value:.17g}", meaning)
-    table.show()
-
-    _head("the textbook's derivation")
-    _print_quantities(found.textbook)
-    print(
-        f"the ray hits where {' and '.join(condition(name) for name in found.guard)}; elsewhere the background is seen"
-    )
-
-    _head(f'the forms that "{found.accuracy}" uses in place of the textbook\'s')
-    table = Table((Column("form"), Column("removes"), Column("source")))
-    for entry in found.forms:
-        table.add(entry.name, entry.removes, entry.source)
-    table.show()
-    print()
-    _print_quantities(found.chosen)
-
-    _head("proved by sympy, exactly")
-    for invariant in found.invariants:
-        print(f"  {'proved' if invariant.holds else 'NOT PROVED':7} {invariant.name}: {invariant.statement}")
-        if invariant.detail:
-            print(f"          {invariant.detail}")
-
-    _head("silhouette")
-    silhouette = found.silhouette
-    print(f"  {silhouette.equation}")
-    print(f"  here: {_conic(silhouette.coefficients)} = 0: {silhouette.kind}")
-    if silhouette.rho is not None:
-        print(f"  {CENTRED} = rho^2, rho = {silhouette.rho!r}")
-
-    _head("operations")
-    table = Table(
-        (Column("stage"), Column("time", right=True), Column("before", right=True), Column("after", right=True))
-    )
-    for step in found.stages:
-        table.add(step.name, duration(step.seconds), *("" if n is None else str(n) for n in (step.before, step.after)))
-        if step.name == "lower":
-            for inner in found.passes:
-                table.add(f"  {inner.name}", duration(inner.seconds), str(inner.before), str(inner.after))
-    table.show()
-    print()
-    for rate, counts in found.operations.items():
-        text = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-        print(f"  a {rate:5}  {text or 'none'}")
-
-
-def _head(text: str) -> None:
-    print(f"\n{text}\n{'-' * len(text)}")
-
-
-def sections(quantities: tuple[Quantity, ...]) -> Iterator[tuple[str, list[Quantity]]]:
-    """Neighbours of one section together."""
-    group: list[Quantity] = []
-    for quantity in quantities:
-        if group and quantity.section != group[-1].section:
-            yield group[0].section, group
-            group = []
-        group.append(quantity)
-    if group:
-        yield group[0].section, group
-
-
-def _print_quantities(quantities: tuple[Quantity, ...]) -> None:
-    width = max((len(q.name) for q in quantities), default=0)
-    for section, group in sections(quantities):
-        print(f"  {section}")
-        for quantity in group:
-            print(f"    {quantity.name:{width}} = {quantity.formula}")
-            said = ". ".join(filter(None, (quantity.meaning, quantity.source)))
-            if said:
-                print(f"    {'':{width}}   {said}")
-        print()
-
-
-def _conic(coefficients: tuple[float, ...]) -> str:
-    parts: list[str] = []
-    for value, power in zip(coefficients, ("x^2", "x y", "y^2", "x", "y", ""), strict=True):
-        if value != 0.0:
-            sign = ("- " if value < 0 else "+ ") if parts else ("-" if value < 0 else "")
-            parts.append(f"{sign}{abs(value):.10g} {power}".rstrip())
-    return " ".join(parts)
+def _out(data: dict[str, Any]) -> None:
+    print(json.dumps(data, indent=2, allow_nan=False))

@@ -1,4 +1,4 @@
-"""An Explanation -> a LaTeX document that pdflatex compiles as it is: article class, amsmath, no other package.
+"""An explanation -> a LaTeX document that pdflatex compiles as it is: article class, amsmath, no other package.
 
 Comes in: formulas that sympy has set, and words as plain text. Never done here: mathematics.
 """
@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from symrender_cg.explain import Explanation, Quantity
+from symrender_cg.explain import Explanation, Quantity, SceneExplanation
+from symrender_cg.plan.plan import Decision
 
 _ESCAPES = {
     "\\": r"\textbackslash{}",
@@ -29,9 +30,10 @@ _PREAMBLE = r"""\documentclass{article}
 """
 
 
-def document(found: Explanation) -> str:
+def document(found: Explanation | SceneExplanation) -> str:
     """The text of the document."""
-    return _PREAMBLE + "\n".join(_body(found)) + "\n\\end{document}\n"
+    body = _body(found) if isinstance(found, Explanation) else _scene_body(found)
+    return _PREAMBLE + "\n".join(body) + "\n\\end{document}\n"
 
 
 def escaped(text: str) -> str:
@@ -42,12 +44,7 @@ def escaped(text: str) -> str:
 def _body(found: Explanation) -> Iterator[str]:
     yield rf"\section*{{{escaped(found.kernel)}}}"
     yield f"Accuracy ``{escaped(found.accuracy)}''; promise: {escaped(found.promise)}."
-    yield r"\subsection*{Plan: which effects can change this image}"
-    yield r"\begin{description}"
-    for decision in found.decisions:
-        word = "in" if decision.needed else "out"
-        yield rf"\item[{word}: {escaped(decision.effect.title)}] {escaped(decision.reason)}."
-    yield r"\end{description}"
+    yield from _plan(found.decisions)
     yield r"\subsection*{Inputs, in the camera's frame}"
     yield r"\begin{tabular}{lrl}"
     for _, latex, meaning, value in found.inputs:
@@ -78,6 +75,26 @@ def _body(found: Explanation) -> Iterator[str]:
     if found.silhouette.rho is not None:
         rho = _number(found.silhouette.rho)
         yield rf"\[ x^2 + y^2 = \frac{{e^2 R^2}}{{e^2 - R^2}} = \rho^2, \qquad \rho = {rho} \]"
+
+
+def _scene_body(found: SceneExplanation) -> Iterator[str]:
+    yield rf"\section*{{{escaped(found.kernel)}}}"
+    yield f"Accuracy ``{escaped(found.accuracy)}''; promise: {escaped(found.promise)}."
+    yield from _plan(found.decisions)
+    for part in found.parts:
+        yield rf"\subsection*{{{escaped(part.name)}: {escaped(part.meaning)}}}"
+        total = ", ".join(f"{sum(counts.values())} a {rate}" for rate, counts in part.operations.items())
+        yield f"Operations: {escaped(total or 'none')}."
+        yield from _quantities(part.quantities)
+
+
+def _plan(decisions: tuple[Decision, ...]) -> Iterator[str]:
+    yield r"\subsection*{Plan: which effects can change this image}"
+    yield r"\begin{description}"
+    for decision in decisions:
+        word = {"needed": "in", "absent": "out", "bounded": "bounded"}[decision.status]
+        yield rf"\item[{word}: {escaped(decision.effect.title)}] {escaped(decision.reason)}."
+    yield r"\end{description}"
 
 
 def _quantities(quantities: tuple[Quantity, ...]) -> Iterator[str]:

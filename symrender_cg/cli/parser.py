@@ -26,6 +26,7 @@ examples:
   python -m symrender_cg render -o sphere.png           its image
   python -m symrender_cg render scene.toml -o out.png --size 800x600
   python -m symrender_cg explain off_axis               the plan and the derivation
+  python -m symrender_cg explain mirrors --ablate       what each effect costs
   python -m symrender_cg check                          the kernels against numpy and the oracle
   python -m symrender_cg doctor                         what this machine has and lacks
 """
@@ -36,12 +37,14 @@ Derives the image of a scene, writes its kernel as C99 under DIR, and compiles i
     DIR/<kernel>/<kernel>.c, <kernel>.h, manifest.json     DIR/support/*.h
 
 To compile the C yourself, add both folders to the include path. What is up to date is not touched: a second run derives
-and compiles nothing."""
+and compiles nothing. The kernel is the one for any window. A scene of many spheres has no kernel of accuracy literal,
+which is the formula of one sphere, and none that is baked: its kernel loops over arrays."""
 _BUILD_EXAMPLES = """\
 examples:
   python -m symrender_cg build
   python -m symrender_cg build scene.toml --accuracy double --passes
   python -m symrender_cg build --accuracy double --bake     the scene's numbers folded into the C
+  python -m symrender_cg build mirrors                      the kernels of a scene of many spheres
 """
 
 _RENDER = """\
@@ -75,18 +78,29 @@ examples:
 _EXPLAIN = """\
 Prints what a kernel rests on: the effects that are in and the proof of each one left out, every named quantity with its
 formula and source, the forms that the accuracy chose, the invariants that sympy proved, the silhouette, and operations
-per stage."""
+per stage. Of a scene of many spheres: the plan, what the kernel loops over, and the parts that its loops are made of.
+
+The plan is that of an image of the shape --size; what is outside such a window is left out.
+
+--findings EFFECT   what was found for each sphere, pair or triple, with inequality, numbers and margin
+--max-error E       leave out also what changes no pixel by more than E in all; such effects are called bounded
+--ablate            measure: each effect left out is forced in again (no pixel may change: exit code 4) and timed; each
+                    effect kept is taken out of the scene, where it can be"""
 _EXPLAIN_EXAMPLES = """\
 examples:
   python -m symrender_cg explain
   python -m symrender_cg explain off_axis --accuracy single
+  python -m symrender_cg explain mirrors --findings shadow
+  python -m symrender_cg explain mirrors --ablate --size 512x512
   python -m symrender_cg explain --latex > derivation.tex     a document that pdflatex compiles as it is
 """
 
 _CHECK = """\
 Compares each compiled kernel with the oracle (exact arithmetic and Arb balls, correctly rounded), with vectorised numpy
 and with the per-pixel loop: on the pixel centres of a whole image, and on points near the silhouette, the terminator
-and the highlight. Errors are those of the unclipped field. Exit code 4 when a stated bound is broken."""
+and the highlight; of a scene of many spheres with brute force in numpy, and on points near outlines, mirrored outlines
+and shadows. Errors are those of the unclipped field. Exit code 4 when a stated bound is broken, or another surface is
+seen than the oracle's."""
 _CHECK_EXAMPLES = """\
 examples:
   python -m symrender_cg check
@@ -152,10 +166,12 @@ def _add_build(commands: argparse._SubParsersAction[Parser]) -> None:
     parser = _command(commands, "build", "derive, write the C, compile", _BUILD, _BUILD_EXAMPLES)
     parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
     _accuracies(parser, "all")
-    parser.add_argument("--bake", action="store_true", help="fold the scene's numbers into the kernel")
+    parser.add_argument("--bake", action="store_true", help="fold the scene's numbers into the kernel (one sphere)")
     _portable(parser)
     parser.add_argument("--out", default="generated", metavar="DIR", help="folder for the C (default: generated)")
-    parser.add_argument("--passes", action="store_true", help="derive anew, and show every pass of the lowering")
+    parser.add_argument(
+        "--passes", action="store_true", help="derive anew, and show every pass (or part) of the lowering"
+    )
 
 
 def _add_render(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -189,6 +205,13 @@ def _add_explain(commands: argparse._SubParsersAction[Parser]) -> None:
     forms = parser.add_mutually_exclusive_group()
     forms.add_argument("--latex", action="store_true", help="a whole LaTeX document (article class, amsmath)")
     forms.add_argument("--json", action="store_true", help="everything as one JSON object")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--findings", metavar="EFFECT", help="what was found for each subject of an effect")
+    what.add_argument("--ablate", action="store_true", help="measure what each effect costs and changes")
+    parser.add_argument(
+        "--max-error", type=tolerance, default=0.0, metavar="E", help="how much any pixel may change (default: 0)"
+    )
+    _size(parser, (256, 256))
 
 
 def _add_check(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -274,6 +297,17 @@ def layer_list(text: str) -> tuple[str, ...]:
     if unknown := [name for name in names if name not in choices]:
         raise argparse.ArgumentTypeError(f"{unknown[0]!r} is not known; expected some of {', '.join(choices)}")
     return names
+
+
+def tolerance(text: str) -> float:
+    """A finite number >= 0. Raises ArgumentTypeError for anything else."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if 0.0 <= value < float("inf"):
+        return value
+    raise argparse.ArgumentTypeError(f"{text!r} is not a tolerance; expected a number >= 0, such as 0.002")
 
 
 def _count(text: str) -> int:

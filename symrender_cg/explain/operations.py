@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Swell:
-    """Operations of a part: each result as one formula in the inputs, its named definitions, its steps in the kernel."""
+    """Operations of a part: its results, each as one formula in the inputs; its named definitions; its steps."""
 
     closed: int
     named: int

@@ -1,6 +1,6 @@
 """What the kernel of a scene rests on: its plan, what it loops over, and its parts with formulas and operations.
 
-Comes in: its translation. Goes out: SceneExplanation, frozen, of text and numbers. Never done here: printing, compiling.
+Comes in: its translation. Goes out: SceneExplanation, frozen, of text and numbers. Never done here: printing.
 """
 
 from __future__ import annotations

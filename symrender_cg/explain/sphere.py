@@ -125,9 +125,9 @@ def explain_sphere(translation: SphereTranslation) -> Explanation:
 def _by_section(quantities: Iterable[Quantity]) -> tuple[Quantity, ...]:
     """The quantities of one section together, sections in the order in which they begin."""
     groups: dict[str, list[Quantity]] = {}
-    for quantity in quantities:
-        groups.setdefault(quantity.section, []).append(quantity)
-    return tuple(quantity for group in groups.values() for quantity in group)
+    for entry in quantities:
+        groups.setdefault(entry.section, []).append(entry)
+    return tuple(entry for group in groups.values() for entry in group)
 
 
 def _silhouette(translation: SphereTranslation, numbers: dict[str, float]) -> Silhouette:
