@@ -19,7 +19,7 @@ from __future__ import annotations
 import importlib.util
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import cache
@@ -93,21 +93,14 @@ class EveryEffect:
         dtype = np.dtype(np.float32 if emitted.result_type == "float" else np.float64)
         return EveryEffect(SceneKernel(emitted.name, emitted.fields, 3, dtype, cached, store.load(cached)))
 
-    def numbers(self, found: Plan) -> dict[str, Any]:
-        """A scene's numbers, and for what it lacks of plane, tiles and gradient numbers that do not matter."""
-        assert found.arrangement is not None, "planned with the kernel of scenes forced"
-        numbers = scene_numbers(found.scene, found.arrangement, 3)
-        lacking: dict[str, Any] = {"background_top": numbers["background"], "up_y": 1.0, "plane_z": -1.0}
-        single_material: dict[str, Any] = {}
-        if len(found.arrangement.plane_materials) < 2:  # every tile is the one numbered 0
-            single_material = {name: 0.0 for name, _ in self.kernel.fields if name.startswith(("across", "along"))}
-        zeros = {name: 0.0 for name, shape in self.kernel.fields if shape == "number"}
-        return zeros | lacking | numbers | single_material
-
     def image(self, found: Plan, width: int, height: int, layers: Mapping[str, NDArray[Any]] | None = None) -> Any:
         """(height, width, 3), or (height, width) of a scene whose plan is grey; the field itself, not clipped."""
         prepared = self.kernel.prepare(
-            self.numbers(found), width=width, height=height, pixel=pixel_size(found.scene, height), white=np.inf
+            numbers_for_every_effect(found, self.kernel.fields),
+            width=width,
+            height=height,
+            pixel=pixel_size(found.scene, height),
+            white=np.inf,
         )
         image = np.empty((height, width, 3), self.kernel.dtype)
         self.kernel.rows(image, prepared, begin=0, end=height, layers=layers)
@@ -127,10 +120,22 @@ class EveryEffect:
 
     def points(self, found: Plan, x: Floats, y: Floats) -> Any:
         """The same as the image at points, which have one shape."""
-        prepared = self.kernel.prepare(self.numbers(found), white=np.inf)
+        prepared = self.kernel.prepare(numbers_for_every_effect(found, self.kernel.fields), white=np.inf)
         values = np.empty((*x.shape, 3), self.kernel.dtype)
         self.kernel.points(values, np.ascontiguousarray(x), np.ascontiguousarray(y), prepared)
         return _in_channels_of(found, values)
+
+
+def numbers_for_every_effect(found: Plan, fields: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    """A scene's numbers, and for what it lacks of plane, tiles and gradient numbers that do not matter."""
+    assert found.arrangement is not None, "planned with the kernel of scenes forced"
+    numbers = scene_numbers(found.scene, found.arrangement, 3)
+    lacking: dict[str, Any] = {"background_top": numbers["background"], "up_y": 1.0, "plane_z": -1.0}
+    single_material: dict[str, Any] = {}
+    if len(found.arrangement.plane_materials) < 2:  # every tile is the one numbered 0
+        single_material = {name: 0.0 for name, _ in fields if name.startswith(("across", "along"))}
+    zeros = {name: 0.0 for name, shape in fields if shape == "number"}
+    return zeros | lacking | numbers | single_material
 
 
 @cache

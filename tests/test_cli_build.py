@@ -9,12 +9,14 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import sympy as sp
 from command_line import LOADED_AFTER, Shell, in_a_process
 
 from symrender_cg import Scene, generate, pipeline, statistics
 from symrender_cg.build.toolchain import find_toolchain
 from symrender_cg.cli.main import main
 from symrender_cg.explain import swollen_operations
+from symrender_cg.explain.operations import swell_of
 from symrender_cg.plan.plan import plan
 
 LEVELS = ("literal", "single", "double")
@@ -292,3 +294,55 @@ def test_the_entry_point_of_the_package_is_this_command_line() -> None:
     from symrender_cg import __main__ as module
 
     assert module.main is main
+
+
+def test_a_scene_of_many_spheres_is_built_part_by_part(shell: Shell, tmp_path: Path) -> None:
+    answer = shell("build", "lights", "--accuracy", "double", "--passes", "--out", tmp_path)
+    assert answer.code == 0
+    translation = pipeline.translate(Scene.builtin("lights"), "double")
+    name = translation.emitted.name
+    assert (tmp_path / name / f"{name}.c").is_file()
+    image = {part: swell_of(translation.parts[part], translation.programs[part]) for part in translation.parts}
+    swell = answer.out[answer.out.index("swell meter") :]
+    for part, counts in image.items():
+        row = cells(swell, f"{part} ")
+        assert row[1:] == [str(counts.closed), str(counts.named), f"double {counts.kernel}"]
+        assert counts.closed == sum(
+            int(sp.count_ops(translation.parts[part].closed(result))) for result in translation.parts[part].results
+        )
+    assert f"{len(image)} parts with" in answer.out
+    assert "colour in, " in answer.out.replace(" and clip", "")
+
+
+def test_the_manifest_of_a_scene_has_its_decisions_fields_and_parts(shell: Shell, tmp_path: Path) -> None:
+    words = ("build", "lights", "--accuracy", "double", "--out", tmp_path)
+    shell(*words)
+    translation = pipeline.translate(Scene.builtin("lights"), "double")
+    name = translation.emitted.name
+    manifest = json.loads((tmp_path / name / "manifest.json").read_text())
+    assert [(e["effect"], e["status"], e["margin"], e["bound"]) for e in manifest["plan"]] == [
+        (d.effect.name, d.status, d.margin, d.bound) for d in translation.plan.decisions
+    ]
+    assert any(entry["margin"] is not None for entry in manifest["plan"])
+    assert [field["name"] for field in manifest["fields"]] == manifest["inputs"]
+    assert manifest["channels"] == 3
+    assert set(manifest["parts"]) == set(translation.parts)
+    for rate, counts in manifest["operations"].items():
+        parts = sum(sum(part.get(rate, {}).values()) for part in manifest["parts"].values())
+        assert parts == sum(counts.values())
+    assert shell(*words).out.startswith(f"nothing had to be done: {name} up to date")
+
+
+def test_all_of_a_scene_leaves_the_formula_of_one_sphere_out(shell: Shell, tmp_path: Path) -> None:
+    answer = shell("build", "two_spheres", "--out", tmp_path)
+    assert answer.code == 0
+    assert answer.err.startswith("symrender_cg: literal is left out: ")
+    assert {path.name for path in tmp_path.iterdir()} == {"scene_single", "scene_double", "support"}
+
+
+def test_baking_a_scene_is_refused_as_usage(shell: Shell, tmp_path: Path) -> None:
+    for accuracy in ("all", "double"):
+        answer = shell("build", "two_spheres", "--bake", "--accuracy", accuracy, "--out", tmp_path)
+        assert answer.code == 2
+        assert "leave bake out" in answer.err
+    assert not list(tmp_path.iterdir())

@@ -11,6 +11,7 @@ from command_line import Shell
 from symrender_cg import Scene, render_image
 from symrender_cg.build.cache import Cache
 from symrender_cg.cli import doctor
+from symrender_cg.plan.plan import plan
 
 
 @pytest.fixture

@@ -29,8 +29,9 @@ def test_text_names_every_decision_definition_proof_and_pass(shell: Shell, scene
     assert answer.code == 0
     translation = pipeline.translate(Scene.builtin(scene), "double")
     for decision in translation.plan.decisions:
+        effect, margin = decision.effect, "" if decision.margin is None else f"{decision.margin:.3g} +"
         assert re.search(
-            rf"^{'in ' if decision.needed else 'out'}  {decision.effect.title} +{re.escape(decision.reason)}",
+            rf"^{'in ' if decision.needed else 'out'}  {effect.name} +{effect.title} +{margin}{re.escape(decision.reason)}",
             answer.out,
             re.M,
         )

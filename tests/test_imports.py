@@ -29,8 +29,8 @@ BELOW: dict[str, set[str]] = {
     "build": {"errors", "version", "resources"},
     "reference": {"errors", "scene"},
 }
-ABOVE = {PACKAGE / "reference" / "check.py"}
-"""Stands above the pipeline: it compares what the pipeline makes with the references beside it."""
+ABOVE = {PACKAGE / "reference" / "check.py", PACKAGE / "reference" / "check_scene.py"}
+"""These stand above the pipeline: they compare what the pipeline makes with the references beside them."""
 
 NO_SYMPY = ("version", "errors", "resources", "scene", "plan", "build", "run", "reference")
 

@@ -250,7 +250,9 @@ def test_arrays_of_any_kind_are_kept_by_name(tmp_path: Path) -> None:
     write_arrays(tmp_path / "a.npz", arrays)
     with np.load(tmp_path / "a.npz", allow_pickle=False) as held:
         assert set(held) == set(arrays)
-        assert all(np.array_equal(held[name], array) and held[name].dtype == array.dtype for name, array in arrays.items())
+        assert all(
+            np.array_equal(held[name], array) and held[name].dtype == array.dtype for name, array in arrays.items()
+        )
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])

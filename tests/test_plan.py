@@ -162,7 +162,7 @@ MANY: dict[str, tuple[Scene, str]] = {
     "mirror": (Scene(CAMERA, (Sphere(material=Phong(reflect=0.5)),), background=0.5), "scene_mirror"),
     "sky": (Scene(CAMERA, background=Gradient()), "scene_sky"),
     "colour": (Scene(CAMERA, (Sphere(material=Phong((0.1, 0.2, 0.3))),)), "scene_rgb"),
-    "grey as a colour": (Scene(CAMERA, background=(0.5, 0.5, 0.5)), "scene_rgb"),
+    "grey as a colour": (Scene(CAMERA, background=(0.5, 0.5, 0.5)), "scene"),
     "at the eye": (Scene(CAMERA, (BESIDE, Sphere((-1.0, 0.0, 3.9), 0.95)), shadows=False), "scene_close"),
     "at the eye and not": (Scene(CAMERA, (BESIDE, Sphere()), shadows=False), "scene_near"),
     "nothing": (Scene(CAMERA, (), ()), "scene_void_flat"),

@@ -88,7 +88,7 @@ def test_the_order_of_spheres_and_lights_in_the_file_changes_no_bit() -> None:
 
 
 def holds_a_light(scene: Scene, k: int) -> bool:
-    """Whether a point light is in a sphere, or on it: it is the light, then, that the plan drops for the sphere's sake."""
+    """Whether a point light is in a sphere, or on it: then the plan drops the light, for the sake of the sphere."""
     sphere = scene.spheres[k]
     points = (light.position for light in scene.lights if isinstance(light, PointLight))
     return scene.shadows and any(math.dist(point, sphere.center) <= 1.0001 * sphere.radius for point in points)
@@ -156,7 +156,7 @@ def halves(light: PointLight | DirectionalLight) -> tuple[PointLight | Direction
 
 
 def test_a_light_split_in_two_halves_changes_rounding_only() -> None:
-    """Measured over 2,000 scenes: 4.1e-16."""
+    """Measured over 2,000 scenes: 3.7e-16."""
     tried = 0
     for seed in SEEDS:
         scene = framed(seed)
@@ -171,20 +171,20 @@ def test_a_light_split_in_two_halves_changes_rounding_only() -> None:
 
 
 def test_scene_and_camera_turned_together_change_rounding_only() -> None:
-    """Every number of the scene is rounded anew: compared where no decision is in doubt by 1e-9, as multiples of the
-    roundings that the reference counts on the way. Measured over 2,000 scenes: 1.1e-14.
+    """Every number of the scene is rounded anew: compared where no decision is in doubt by 1e-9, also not in the turned
+    scene, and over the number of roundings that the reference counts on the way. Measured over 2,000 scenes: 1.9e-14.
     """
     compared = 0
     for seed in SEEDS:
         scene = framed(seed)
         other = turned(scene, seed)
         traced = brute_force.image(scene, WIDTH, HEIGHT)
-        clear = traced.doubt > 1e-9
+        clear = np.minimum(traced.doubt, brute_force.image(other, WIDTH, HEIGHT).doubt) > 1e-9
         before, after = image(scene), image(other)
         growth = traced.condition if before.ndim == 2 else traced.condition[..., np.newaxis]
         assert errors(after / growth, before / growth, clear) < 2e-13, seed
         compared += int(clear.sum())
-    assert compared > 0.95 * len(SEEDS) * WIDTH * HEIGHT
+    assert compared > 0.9 * len(SEEDS) * WIDTH * HEIGHT
 
 
 # ------------------------------------------------------------------------------------------------ colour, and compiling

@@ -120,6 +120,7 @@ def emit_scene(
         "plan": plan,
         "variant": variant,
         "title": _title(need),
+        "decided": _decided(need),
         "real": real,
         "single": single,
         "cast": "(float)" if single else "",
@@ -173,6 +174,21 @@ def _title(need: Needs) -> str:
     if need.plane:
         what = "spheres on a plane" if need.spheres else "a plane"
     return f"{what}, every number an argument"
+
+
+def _decided(need: Needs) -> str:
+    """What is decided in floating point, as words; empty where nothing is."""
+    things = [
+        *(["which of two intersecting surfaces is in front"] if need.intersections or need.crossing else []),
+        *(["the horizon of the plane"] if need.plane else []),
+        *(["the edges of tiles"] if need.checker else []),
+        *(["the edges of shadows"] if need.shadows else []),
+        *(["what mirrors show"] if need.mirrors else []),
+    ]
+    if not things:
+        return ""
+    listed = things[0] if len(things) == 1 else f"{', '.join(things[:-1])} and {things[-1]}"
+    return f"{listed} {'are' if len(things) > 1 or need.shadows else 'is'}"
 
 
 def _stored(need: Needs) -> tuple[str, ...]:

@@ -6,6 +6,10 @@
     points        pixel centres, and points where an image is hard to get right
     compare       largest errors of float values against the oracle's answers
 
-Each takes a Scene with one sphere and one light, moves it to the camera's frame, and takes those numbers as exact.
+    brute_force   every ray, sphere, blocker and bounce by numpy, no plan       a reference for all scenes
+    scene_oracle  the same in exact integers and Arb balls                      the truth for all scenes
+
+The first five take a Scene with one sphere and one light. All move it to the camera's frame and take those numbers as
+exact.
 Import the module that you need: only `oracle` and `compare` load python-flint.
 """
