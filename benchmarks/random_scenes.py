@@ -113,7 +113,7 @@ class EveryEffect:
         arrays = layer_arrays(LAYERS, (height, width), 3, len(found.given.lights))
         image = self.image(found, width, height, arrays)
         plane, spheres = len(found.given.spheres), arrangement.spheres
-        table = np.concatenate((spheres, [plane] * (arrangement.receivers - len(spheres)), [-1]))
+        table = np.array([*spheres.tolist(), *[plane] * (arrangement.receivers - len(spheres)), -1], dtype=np.int32)
         for name in TERMS:
             arrays[name] = _in_channels_of(found, arrays[name])
         return {"image": image, **arrays, "index": table[arrays["index"]]}

@@ -104,7 +104,7 @@ def _scene_entries(translation: Translation) -> dict[str, Any]:
         "channels": 3 if "colour" in translation.plan.flags else 1,
         "flags": sorted(translation.plan.flags),
         "fields": [{"name": name, "shape": shape} for name, shape in translation.emitted.fields],
-        "parts": {name: by_rate for name, by_rate in part_operations(translation).items()},
+        "parts": part_operations(translation),
     }
 
 

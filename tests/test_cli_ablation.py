@@ -32,7 +32,7 @@ def few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ablation, "ROUNDS", 1)
 
 
-@pytest.mark.parametrize("scene", ["shadow", "chapter1"])
+@pytest.mark.parametrize("scene", ["two_spheres", "chapter1"])
 def test_what_is_left_out_changes_no_pixel_and_what_is_kept_does(shell: Shell, scene: str) -> None:
     answer = shell("explain", scene, "--ablate", *SMALL, "--json")
     assert answer.code == 0
@@ -54,8 +54,7 @@ def test_what_is_left_out_changes_no_pixel_and_what_is_kept_does(shell: Shell, s
 
 def test_what_an_effect_changes_is_the_difference_of_the_two_images() -> None:
     scene = Scene.builtin("shadow").in_camera_frame()
-    found = Experiment(scene, "double", size=(40, 30)).run()
-    (trial,) = (t for t in found.trials if t.effect == "shadow")
+    (trial,) = Experiment(scene, "double", size=(40, 30), effects={"shadow"}).run().trials
     lit = replace_scene(scene, shadows=False)
     apart = np.abs(render_image(scene, 40, 30, clip=False) - render_image(lit, 40, 30, clip=False))
     assert trial.tried == "shadows = false"
@@ -70,7 +69,7 @@ def replace_scene(scene: Scene, **changes: object) -> Scene:
 
 
 def test_text_has_a_row_for_every_effect_of_the_plan(shell: Shell) -> None:
-    answer = shell("explain", "shadow", "--ablate", *SMALL)
+    answer = shell("explain", "two_spheres", "--ablate", *SMALL)
     assert answer.code == 0
     rows = [line.split() for line in answer.out.splitlines()]
     for effect in EFFECTS:
@@ -91,7 +90,7 @@ def test_a_plan_that_leaves_out_too_much_is_found_out_with_exit_code_4(
         return image
 
     monkeypatch.setattr(ablation, "_image", spoiled)
-    answer = shell("explain", "shadow", "--ablate", *SMALL)
+    answer = shell("explain", "two_spheres", "--ablate", *SMALL)
     assert answer.code == 4
     assert "BROKEN" in answer.out
     assert "order: left out as absent, but forced in it changes a pixel by 9.09e-13, allowed 0" in answer.err
@@ -99,7 +98,8 @@ def test_a_plan_that_leaves_out_too_much_is_found_out_with_exit_code_4(
 
 def test_a_tolerance_allows_its_bound_and_no_more() -> None:
     scene = Scene.builtin("mirrors")
-    found = Experiment(scene, "double", size=(24, 18), max_error=0.4).run()
+    effects = {"mirror_depth", "attenuation", "order"}
+    found = Experiment(scene, "double", size=(24, 18), max_error=0.4, effects=effects).run()
     found.require()
     (depth,) = (trial for trial in found.trials if trial.effect == "mirror_depth")
     assert depth.status in ("bounded", "needed")
@@ -113,7 +113,7 @@ def test_a_tolerance_allows_its_bound_and_no_more() -> None:
 def test_a_scene_that_comes_down_to_one_sphere_is_compared_kind_by_kind() -> None:
     front, back = Sphere((0.0, 0.0, 0.0), 1.0), Sphere((0.0, 0.0, -3.0), 0.25)
     scene = Scene(Camera((0.0, 0.0, 4.0), half_height=2.0), (back, front), shadows=False)
-    found = Experiment(scene, "double", size=(24, 18)).run()
+    found = Experiment(scene, "double", size=(24, 18), effects={"hidden", "shadow"}).run()
     found.require()
     (hidden,) = (trial for trial in found.trials if trial.effect == "hidden")
     assert hidden.change == 0.0

@@ -13,8 +13,8 @@ from msgspec import structs
 
 from symrender_cg import Camera, Phong, PointLight, Scene, Sphere, evaluate, pipeline
 from symrender_cg.errors import AccuracyError
-from symrender_cg.reference import check as module
 from symrender_cg.reference import brute_force, check_scene, compare, oracle, points, scene_oracle
+from symrender_cg.reference import check as module
 from symrender_cg.reference.check import check, stated_bound
 from symrender_cg.reference.check_rows import Report, Row
 from symrender_cg.run.kernel import Kernel
@@ -263,7 +263,7 @@ def test_edge_points_lie_on_both_sides_of_edges_of_their_kind() -> None:
                 jump = np.abs(here.value - there.value).max(axis=-1) > 1e-3
                 close |= same & (lit | jump)
         assert close.mean() > 0.8, where
-    assert len(check_scene.edge_points(Scene.chapter1(), 1.0, 20, 1)) == 2
+    assert len(check_scene.edge_points(Scene.chapter1().in_camera_frame(), 1.0, 20, 1)) == 2
 
 
 def test_a_wrong_colour_breaks_the_bound_of_a_scene(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:

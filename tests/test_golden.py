@@ -28,6 +28,8 @@ KERNELS = (
     ("chapter1", "double", False),
     ("chapter1", "double", True),
     ("off_axis", "double", False),
+    ("shadow", "double", False),
+    ("mirrors", "double", False),
 )
 """The kernels that are checked in: scene, accuracy, whether its numbers are baked in."""
 

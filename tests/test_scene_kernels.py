@@ -53,7 +53,7 @@ BOUND = 1e-12
 """Of |value - brute force| / max(1, value), where no decision is in doubt by 1e-9. Measured: 3.9e-14."""
 
 BOUND_SINGLE = 1e-5
-"""The same for float32, where no decision is in doubt by 1e-4. Measured: 2.8e-6."""
+"""The same for float32, where no decision is in doubt by 1e-4. Measured: 1.6e-6."""
 
 Floats = npt.NDArray[np.float64]
 
@@ -82,8 +82,11 @@ def scene_plan(scene: Scene, *, aspect: float | None = WIDTH / HEIGHT) -> Plan:
 
 def test_a_scene_is_brute_force_s_at_every_pixel_that_is_not_in_doubt() -> None:
     found = [compared(seed) for seed in SEEDS]
-    assert [scene.seed for scene in found if not scene.error < BOUND] == []
-    assert sum(scene.doubtful for scene in found) < 0.01 * sum(scene.pixels for scene in found)
+    assert [one.seed for one in found if not one.error < BOUND] == []
+    for seed in range(5000, 5100):
+        scene, traced = random_scene(seed), brute_force.image(random_scene(seed), WIDTH, HEIGHT)
+        assert errors(every().image(scene_plan(scene), WIDTH, HEIGHT), traced.value, traced.doubt > 1e-9) < BOUND, seed
+    assert sum(one.doubtful for one in found) < 0.01 * sum(one.pixels for one in found)
 
 
 def test_a_scene_in_float32_is_brute_force_s_at_every_pixel_that_is_not_in_doubt() -> None:
@@ -99,12 +102,12 @@ def test_every_value_is_a_number() -> None:
 
 
 def test_depths_and_normals_are_brute_force_s() -> None:
-    """Measured: relative to the depth 1.1e-13."""
+    """Measured: 9.7e-13, of the depth or of 1."""
     assert [seed for seed in SEEDS if not compared(seed).geometry < 1e-11] == []
 
 
 def test_the_terms_add_up_to_the_image() -> None:
-    """At every pixel; as sums of other orders do, to a few ulp. Measured: 4e-16."""
+    """At every pixel; as sums of other orders do, to a few ulp. Measured: 4.2e-16."""
     assert [seed for seed in SEEDS if not compared(seed).terms < 2e-15] == []
 
 
@@ -122,7 +125,7 @@ def test_points_are_pixels_bit_for_bit() -> None:
 def test_an_effect_forced_in_changes_no_bit(effect: str) -> None:
     """What is left out adds 0, is never nearer, never darkens; so sums and comparisons stay what they are, bit by bit.
 
-    front_test alone takes another form of the same normal, by the cross product: equal to rounding. Measured: 4e-14.
+    front_test alone takes another form of the same normal, by the cross product: equal to rounding. Measured: 1.8e-14.
     """
     changes = {seed: compared(seed).changed.get(effect, 0.0) for seed in SEEDS}
     if effect in OTHER_FORM:
@@ -149,7 +152,7 @@ def test_a_scene_of_hypothesis_is_brute_force_s_with_and_without_an_effect_force
 
 # ---------------------------------------------------------------------------------------------- the scene's own kernel
 
-STRUCTURES = 4
+STRUCTURES = 3
 RICH = frozenset({"spans", "diffuse", "specular"})
 
 

@@ -94,6 +94,12 @@ def holds_a_light(scene: Scene, k: int) -> bool:
     return scene.shadows and any(math.dist(point, sphere.center) <= 1.0001 * sphere.radius for point in points)
 
 
+def in_colour(scene: Scene) -> npt.NDArray[Any]:
+    """The image in three channels: a scene that loses its one coloured sphere is grey."""
+    values = image(scene)
+    return values if values.ndim == 3 else np.stack([values] * 3, axis=-1)
+
+
 def test_spheres_that_the_plan_drops_can_be_deleted_with_no_bit_changed() -> None:
     """But for those that keep the light of a lamp within them from all the others."""
     tried = 0
@@ -106,9 +112,9 @@ def test_spheres_that_the_plan_drops_can_be_deleted_with_no_bit_changed() -> Non
         if not dropped:
             continue
         fewer = structs.replace(scene, spheres=tuple(s for k, s in enumerate(scene.spheres) if k in kept))
-        np.testing.assert_array_equal(image(fewer), image(scene), str(seed))
+        np.testing.assert_array_equal(in_colour(fewer), in_colour(scene), str(seed))
         one_less = structs.replace(scene, spheres=scene.spheres[: dropped[0]] + scene.spheres[dropped[0] + 1 :])
-        np.testing.assert_array_equal(image(one_less), image(scene), str(seed))
+        np.testing.assert_array_equal(in_colour(one_less), in_colour(scene), str(seed))
         tried += 1
     assert tried > 0.2 * len(SEEDS)
 

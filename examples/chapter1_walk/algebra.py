@@ -19,8 +19,8 @@ from chapter1_walk.lab import BoolArray, Finding, FloatArray, Lab, ns_of_kernel
 from symrender_cg import Camera, Phong, Scene, Sphere, compile_kernel, evaluate, render_image, translate
 from symrender_cg.lower.nodes import Call
 from symrender_cg.lower.nodes import walk as nodes_of
-from symrender_cg.lower.program import RATES, operations_of
-from symrender_cg.pipeline import Translation
+from symrender_cg.lower.program import operations_of
+from symrender_cg.pipeline import SphereTranslation, Translation
 from symrender_cg.reference import oracle
 from symrender_cg.run.numbers import numbers_of
 
@@ -103,7 +103,9 @@ def cell_8(lab: Lab) -> list[Finding]:
 
 
 def _derivative(lab: Lab) -> list[Finding]:
-    program = translate(lab.scene, "literal").image
+    literal = translate(lab.scene, "literal")
+    assert isinstance(literal, SphereTranslation), "Chapter 1 has one sphere"
+    program = literal.image
     slope = differentiate(program, "light_x")
     values = evaluate_by_name(slope, {**numbers_of(lab.scene), "x": lab.x, "y": lab.y})
     field = seed_cells.cell_6_derivative(lab.seed)
@@ -169,8 +171,9 @@ def _baking(lab: Lab) -> list[Finding]:
 
 def _work(translation: Translation) -> dict[str, str]:
     """Operations at each rate, powers b^n apart, for they cost as much as the rest together."""
+    assert isinstance(translation, SphereTranslation), "Chapter 1 has one sphere"
     counts: dict[str, str] = {}
-    for rate in RATES:
+    for rate in ("frame", "row", "pixel"):
         steps = translation.program.at(rate)
         total = sum(sum(operations_of(step).values()) for step in steps)
         powers = sum(

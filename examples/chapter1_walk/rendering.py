@@ -20,7 +20,7 @@ from chapter1_walk.pictures import Gallery
 from symrender_cg import Scene, render_image, translate
 from symrender_cg.derive import seed as seed_derivation
 from symrender_cg.derive.symbols import symbol
-from symrender_cg.pipeline import Translation
+from symrender_cg.pipeline import SphereTranslation
 from symrender_cg.reference import oracle
 from symrender_cg.reference.compare import measure
 from symrender_cg.reference.per_pixel import evaluate_per_pixel, render_per_pixel
@@ -53,6 +53,7 @@ def cell_2(scene: Scene, gallery: Gallery, console: Console) -> tuple[seed_deriv
     seed = seed_derivation.cell_2()
     start = time.perf_counter()
     ours = translate(scene, "literal")
+    assert isinstance(ours, SphereTranslation), "Chapter 1 has one sphere"
     seconds = time.perf_counter() - start
     named = ours.image.operations()
     swell = seed.swell()
@@ -163,7 +164,7 @@ def cell_4(lab: Lab) -> list[Finding]:
     ]
 
 
-def _digits_of_agreement(seed: seed_derivation.SeedImage, ours: Translation) -> int:
+def _digits_of_agreement(seed: seed_derivation.SeedImage, ours: SphereTranslation) -> int:
     """Digits, of 50 computed, to which the two closed forms agree at 20 points of 20 scenes (seeded)."""
     lengths = ("x", "y", "radius", "eye", "light_x", "light_y", "light_z")
     names = (*lengths, "k_ambient", "k_diffuse", "k_specular", "shininess")

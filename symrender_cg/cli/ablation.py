@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -21,8 +22,14 @@ def measured(scene: Scene, accuracy: str, size: tuple[int, int], max_error: floa
 
 def as_data(found: Ablation) -> dict[str, Any]:
     """The ablation as what JSON holds."""
+
+    def trial_data(trial: Trial) -> dict[str, Any]:
+        """What is not finite becomes null."""
+        change = trial.change if trial.change is not None and math.isfinite(trial.change) else None
+        return asdict(trial) | {"change": change, "holds": trial.holds}
+
     return asdict(found) | {
-        "trials": [asdict(trial) | {"holds": trial.holds} for trial in found.trials],
+        "trials": [trial_data(trial) for trial in found.trials],
         "holds": all(trial.holds for trial in found.trials),
     }
 

@@ -13,7 +13,8 @@ may be off by its bound.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Collection
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from typing import Any, Final
@@ -36,7 +37,7 @@ ROUNDS: Final = 9
 OTHER_FORMULAS: Final = frozenset({"off_axis", "front_test"})
 ROUNDING: Final = {"double": 1e-13, "single": 1e-5}
 """Stated bound on the error of a value not above 1, see symrender_cg.reference.check_scene."""
-_COMPILING_THREADS: Final = 2
+_COMPILING_THREADS: Final = max(2, os.cpu_count() or 1)
 
 Told = Callable[[int], None]
 
@@ -48,7 +49,7 @@ class Trial:
     tried     what was drawn: `forced in`, or the scene without it, such as `shadows = false`; or why nothing was drawn
     change    largest change of any channel of any pixel; None where nothing was drawn
     share     share of the pixels that differ
-    allowed   of an effect left out: the largest change that may be
+    allowed   of an effect left out: the largest change that may be; None where nothing is stated of the accuracy
     seconds   of one image of what was drawn
     ratio     time with the effect over time without it
     """
@@ -105,16 +106,27 @@ class _Variation:
 
 
 class Experiment:
-    """The variations of a scene, planned; `steps` is how much `run` counts by its callback."""
+    """The variations of a scene, planned; `steps` is how much `run` counts by its callback.
+
+    effects: names of those that are tried, all if not given.
+    """
 
     def __init__(
-        self, scene: Scene, accuracy: str, *, size: tuple[int, int], max_error: float = 0.0, portable: bool = False
+        self,
+        scene: Scene,
+        accuracy: str,
+        *,
+        size: tuple[int, int],
+        max_error: float = 0.0,
+        portable: bool = False,
+        effects: Collection[str] | None = None,
     ) -> None:
         self.scene = scene.in_camera_frame()  # so that leaving something out does not move the window
         self.accuracy = accuracy
         self.size = size
         self.max_error = max_error
         self.portable = portable
+        self.effects = effects
         self.variations: list[_Variation] = []
         self._untried: dict[str, str] = {}
         self._base = self._planned(self.scene)
@@ -133,7 +145,8 @@ class Experiment:
     def decisions(self) -> tuple[Decision, ...]:
         """The effects that are tried, in the order of the registry."""
         base = self._base
-        return base.decisions if base.arrangement is None and base.scene is base.given else base.summary
+        known = base.decisions if base.arrangement is None and base.scene is base.given else base.summary
+        return tuple(d for d in known if self.effects is None or d.effect.name in self.effects)
 
     def _list(self) -> None:
         self.variations.append(_Variation(self.scene, None, "", self._base))
@@ -242,7 +255,8 @@ class Experiment:
             allowed = self._base.bound + variation.plan.bound
             if effect.name in OTHER_FORMULAS or self.max_error > 0.0:
                 top = max(1.0, float(np.abs(base).max(initial=0.0)))
-                allowed += 2.0 * top * ROUNDING.get(self.accuracy, np.inf)
+                rounding = ROUNDING.get(self.accuracy)
+                allowed = None if rounding is None else allowed + 2.0 * top * rounding
         with_it, without_it = (seconds, base_seconds) if forced or variation.clip else (base_seconds, seconds)
         return Trial(
             effect.name,

@@ -5,9 +5,13 @@ The passes are those of the kernels of one sphere, in the same order; a part has
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import cast
 
+import sympy as sp
+
 from symrender_cg.derive.parts import Part
+from symrender_cg.derive.symbols import symbol
 from symrender_cg.lower import passes
 from symrender_cg.lower.formats import convert_formats
 from symrender_cg.lower.freeze import freeze
@@ -39,6 +43,8 @@ def lower_part(part: Part, variant: Variant) -> KernelProgram:
         rates=rates,
         narrow=frozenset(part.arrays) if single else frozenset(),
     )
+    if single:
+        program = _with_exact_depth(program)
     program = passes.assign_formats(program, variant, exact=part.name in ("span", "near"))
     if part.name in _SCALED:
         program = passes.scale_lengths(program, farthest=30 if single else 60)
@@ -57,3 +63,21 @@ def lower_part(part: Part, variant: Variant) -> KernelProgram:
         program = step(program)
         program.check()
     return program
+
+
+def _with_exact_depth(program: KernelProgram) -> KernelProgram:
+    """The distance of a hit from a root in float64: depths that nearly meet are told apart as well as in `double`.
+
+    hit_distance = ... / (ahead + facing)  ->  wide_facing = sqrt(facing2); hit_distance = ... / (ahead + wide_facing)
+    """
+    if "hit_distance" not in program or "facing2" not in program:
+        return program
+    steps: list[Step] = []
+    for step in program.steps:
+        if step.name == "hit_distance":
+            wide = Step("wide_facing", sp.sqrt(symbol("facing2")), step.section, "facing, in float64")
+            change = {symbol("facing"): wide.symbol}
+            steps += [wide, replace(step, value=step.value.xreplace(change))]
+        else:
+            steps.append(step)
+    return program.with_steps(steps)

@@ -72,7 +72,7 @@ VARIANTS: tuple[Variant, ...] = (
                 "before_eye",
                 "focal",
                 "plane_unit",
-                *("height2", "row_low", "row_high", "ahead", "hit_distance"),
+                *("height2", "row_low", "row_high", "ahead", "wide_facing", "hit_distance"),
                 *(
                     "gap_room",
                     "plain_gap",

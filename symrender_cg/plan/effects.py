@@ -246,9 +246,7 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         optional=False,
         condition="bottom = top, or one background for all directions",
     ),
-    Effect(
-        "colour", "colour", "two of three channels", optional=False, condition="every colour of the scene is grey"
-    ),
+    Effect("colour", "colour", "two of three channels", optional=False, condition="every colour of the scene is grey"),
     Effect(
         "clip",
         "clipping at 1",

@@ -13,7 +13,7 @@ see different things, 4 to 45 times, so that the edge is from 1/16 to 3e-14 of a
 Stated bounds, on |value - truth| of each channel, I the brightest value of any point: 1e-13 max(1, I) for double, 1e-5
 max(1, I) for single, and what is seen is right at every point: of double without exception, of single but for which of
 two surfaces that cut each other is in front, within its rounding of their depths. Measured, not proved: on the built-in
-scenes the largest errors on an image are 1.1e-15 and 3.1e-7, near edges in a mirror 5.9e-14 and 6.9e-6. There the bound
+scenes the largest errors on an image are 1.1e-15 and 9.0e-7, near edges in a mirror 7.6e-14 and 9.4e-6. There the bound
 leaves room for what mirrors do: what one rounding turns a direction by grows at each bounce on a sphere by twice the
 distance over its radius, so that no bound over all scenes can be stated. So a point that misses it is `in doubt` and
 counted apart where brute force says that its value rests on a decision within rounding (at the edge of a shadow or of a
