@@ -136,7 +136,7 @@ def emit_scene(
         "near": need.at_eye,
         "contested": need.spheres and (need.intersections or need.crossing),
         "contest": " || ".join(contest),
-        "left_test": "".join(f"{condition} && " for condition in spared),
+        "left_test": " && ".join(spared),
         "mirrored_spheres": need.mirrors,
         "primaries": primaries,
         "fields": lines,

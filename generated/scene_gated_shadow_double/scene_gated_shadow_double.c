@@ -1,0 +1,1009 @@
+/* scene_gated_shadow_double: spheres, every number an argument
+ * Accuracy "double" (symrender_cg 0.1.0)
+ * Generated from the formula; do not edit. Regenerate with:
+ *     python -m symrender_cg build shadow --accuracy double
+ *
+ * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
+ *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
+ *          wrong
+ *          What a ray of the eye hits is exact; the edges of shadows are decided in float64
+ * in       sphere off the axis
+ *          diffuse term
+ *          specular term
+ *          gated specular
+ *          lights on surfaces
+ *          shadows of spheres
+ *          clipping at 1
+ * out      sphere at the plane of the eye: 2 visible spheres wholly before the eye
+ *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
+ *          not, diffuse is 0
+ *          spheres behind the eye: no sphere of 2 wholly behind the plane of the eye
+ *          spheres outside the window: no window: any point of the image plane may be asked for
+ *          hidden spheres: no sphere of 2 wholly hidden
+ *          order along the ray: 1 pair of visible spheres disjoint: the smaller power of the eye is in front on
+ *          every ray
+ *          the plane: the scene has no plane
+ *          tiles of the plane: the scene has no plane
+ *          shadow of the plane: the scene has no plane
+ *          reflections: no surface that is seen mirrors anything
+ *          reflections of reflections: 0 of 4 bounces: no longer chain of mirrors that may see one another
+ *          lights that fade with distance: every light that lights anything is as strong at every distance
+ *          lights from a direction: 0 of 1 light from a direction
+ *          background in two colours: the background is 0.0 in every direction
+ *          colour: every colour of the scene is grey: one channel
+ *          numbers above are those of the scene it was written for; any scene with the same effects may call it
+ * ops      span: a frame: 3 mul 1 div 4 call, a sphere: 10 mul 7 add 3 div 2 sqrt 2 max 34 call, a row: 21 mul 12
+ *            add 1 sqrt 2 max 18 call, a pixel: 24 mul 21 add 2 div 2 sqrt 1 max
+ *          lamp: a sphere: 3 add 3 div 6 call
+ *          reach: a pixel: 6 mul 5 add
+ *          matte: a pixel: 4 mul 2 add 1 div 1 sqrt 1 max 1 select
+ *          glossy: a pixel: 20 mul 9 add 1 div 1 sqrt 1 max 4 select 1 call
+ *          shadow: a pixel: 14 mul 12 add 1 select
+ */
+#include "scene_gated_shadow_double.h"
+
+#include "inline.h"
+#include "span.h"
+#include "units.h"
+#include "phong_power.h"
+#include "double_double.h"
+#include "exact_sign.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    CHANNELS = 1,
+    POINTS = 128,   /* points shaded together: their arrays stay in the cache nearest to the processor */
+    LANES = 8       /* runs begin at its multiples, and loops end there: nobody reads what lies between two runs */
+};
+
+typedef scene_gated_shadow_double_scene scene_type;
+typedef scene_gated_shadow_double_frame frame;
+typedef scene_gated_shadow_double_layers layer_set;
+
+static inline int padded(int count)
+{
+    return (count + LANES - 1) / LANES * LANES;
+}
+
+static void *array(size_t count, size_t size)
+{
+    return calloc(count ? count : 1, size);
+}
+
+/* A run: neighbouring points of one receiver of light. */
+typedef struct {
+    int receiver, at, count;   /* points at <= i < at + count */
+    int place;                 /* pixel of the first of them, or its number among the points asked for */
+    int lamp, terms;           /* the lamp that lights it now, and which terms it adds */
+} run;
+
+/* Points that are shaded together, whatever they belong to. */
+typedef struct {
+    double value[CHANNELS][POINTS];
+    double n_x[POINTS], n_y[POINTS], n_z[POINTS];   /* outward normal */
+    double mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS];   /* the ray mirrored there */
+    double inv_d2[POINTS];   /* one over its length squared */
+    double w_x[POINTS], w_y[POINTS], w_z[POINTS], w2[POINTS];   /* to the lamp, and its length squared */
+    double light[POINTS];   /* how much of the lamp's light arrives */
+    double cosine[POINTS];   /* max(0, n.l) */
+    double lobe[POINTS], shininess[POINTS];   /* max(0, r.v)^n, and n */
+    int count, runs;
+    run run[POINTS];
+} points;
+
+/* ---- spheres before the eye: their pixels in a row are one span ---- */
+
+/* What does not change within a frame. */
+typedef struct {
+    double plane_unit, focal, d_dot_d_frame, tilt_frame, most_disc_frame, eye;
+    double_double row_disc_frame;
+} span_frame;
+
+static span_frame span_frame_of(const scene_type *scene)
+{
+    /* units of length, powers of two [2 call] */
+    const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
+    const double plane_unit = ldexp(1, plane_exponent);
+
+    /* silhouette [2 call] */
+    /* rays D = (x, y, -f): f is e, in the unit of the image plane */
+    const double focal = ldexp(scene->eye, plane_exponent);
+    const double_double row_disc_frame = dd_product(focal, focal);   /* what is the same for a frame in row_disc */
+
+    /* ray and sphere [1 mul] */
+    const double share_2 = focal * focal;
+    const double d_dot_d_frame = share_2;   /* what is the same for a frame in d_dot_d */
+
+    /* normal [1 div] */
+    const double tilt_frame = 1.0 / focal;   /* what is the same for a frame in tilt */
+
+    /* outline [2 mul] */
+    /* what is the same for a frame in most_disc */
+    const double most_disc_frame = 3.552713678800501e-15 * 281474976710657.0 * share_2;
+
+    const span_frame carried = {
+        .plane_unit = plane_unit,
+        .focal = focal,
+        .row_disc_frame = row_disc_frame,
+        .d_dot_d_frame = d_dot_d_frame,
+        .tilt_frame = tilt_frame,
+        .most_disc_frame = most_disc_frame,
+        .eye = scene->eye,
+    };
+    return carried;
+}
+
+/* What does not change within a sphere. */
+typedef struct {
+    double_double offset_y, alpha, depth, offset_x, row_mid_sphere, row_gap_sphere, row_half_sphere, x_left_sphere,
+        image_x, image_y, power;
+    double row_low, row_high, ahead_sphere, gap_room_sphere, plain_gap_sphere, most_half_sphere, most_half_sphere_1,
+        most_half_sphere_2, outline_left_sphere;
+} span_sphere;
+
+static span_sphere span_sphere_of(const scene_type *scene, int k, const span_frame *f)
+{
+    /* units of length, powers of two [6 call] */
+    const int world_exponent = unit_exponent(scene->radius[k]);   /* R 2^k in [1, 2) */
+    const double eye = ldexp(f->eye, world_exponent);
+    const double radius = ldexp(scene->radius[k], world_exponent);
+    const double center_x = ldexp(scene->center_x[k], world_exponent);
+    const double center_y = ldexp(scene->center_y[k], world_exponent);
+    const double center_z = ldexp(scene->center_z[k], world_exponent);
+
+    /* silhouette [5 mul 6 add 2 div 1 sqrt 1 max 26 call] */
+    const double_double distance = dd_difference(eye, center_z);   /* of the eye from the plane of the centre */
+    const double_double offset_y = dd_div(dd_from(center_y), dd_from(radius));
+    /* disc / R^2 is -alpha x^2 + ... along a row; alpha = kappa^2 - 1 + offset_y^2 > 0 */
+    const double_double alpha = dd_add(dd_div(dd_mul(dd_add_double(distance, -radius),
+        dd_add_double(distance, radius)), dd_product(radius, radius)), dd_mul(offset_y, offset_y));
+    const double_double depth = dd_div(distance, dd_from(radius));   /* kappa: the same in radii */
+    const double_double offset_x = dd_div(dd_from(center_x), dd_from(radius));
+    /* what is the same for a sphere in row_mid */
+    const double_double row_mid_sphere = dd_mul_double(depth, f->focal);
+    const double_double share_11 = dd_mul_double(offset_y, f->focal);
+    const double_double row_gap_sphere = dd_neg(share_11);   /* what is the same for a sphere in row_gap */
+    const double_double share_12 = dd_add(alpha, dd_mul(offset_x, offset_x));
+    const double_double row_half_sphere = share_12;   /* what is the same for a sphere in row_half */
+    const double_double x_left_sphere = dd_div(dd_from(1.0), alpha);   /* what is the same for a sphere in x_left */
+    /* where the centre appears on the image plane */
+    const double_double image_x = dd_div(dd_mul_double(offset_x, f->focal), depth);
+    const double_double image_y = dd_div(share_11, depth);
+    /* kappa^2 - 1 */
+    const double height2 = (distance.hi - radius + distance.lo) * (radius + distance.hi + distance.lo)
+        / (radius * radius);
+    const double share_4 = offset_y.hi * depth.hi;
+    const double share_5 = sqrt(alpha.hi > 0.0 ? alpha.hi : 0.0);
+    const double share_6 = f->focal / height2;
+    const double row_low = (share_4 - share_5) * share_6;   /* the rows that meet the silhouette: row_disc = 0 */
+    const double row_high = (share_4 + share_5) * share_6;
+
+    /* distance [1 mul] */
+    const double_double power = share_12;   /* |m|^2 - 1: the power of the eye in radii, squared */
+    const double ahead_sphere = f->focal * depth.hi;   /* what is the same for a sphere in ahead */
+
+    /* outline [4 mul 1 add 1 div 1 sqrt 1 max 2 call] */
+    const double share_7 = fabs(offset_y.hi);
+    /* what is the same for a sphere in gap_room */
+    const double gap_room_sphere = 3.552713678800501e-15 * f->focal * share_7;
+    const double plain_gap_sphere = -(offset_y.hi * f->focal);   /* what is the same for a sphere in plain_gap */
+    const double most_half_sphere = fabs(offset_x.hi);   /* what is the same for a sphere in most_half */
+    const double most_half_sphere_1 = share_7;   /* what is the same for a sphere in most_half */
+    /* what is the same for a sphere in most_half */
+    const double most_half_sphere_2 = sqrt(alpha.hi + offset_x.hi * offset_x.hi > 0.0 ? alpha.hi + offset_x.hi
+        * offset_x.hi : 0.0);
+    const double outline_left_sphere = 1.0 / alpha.hi;   /* what is the same for a sphere in outline_left */
+
+    const span_sphere carried = {
+        .offset_y = offset_y,
+        .alpha = alpha,
+        .depth = depth,
+        .offset_x = offset_x,
+        .row_mid_sphere = row_mid_sphere,
+        .row_gap_sphere = row_gap_sphere,
+        .row_half_sphere = row_half_sphere,
+        .x_left_sphere = x_left_sphere,
+        .image_x = image_x,
+        .image_y = image_y,
+        .row_low = row_low,
+        .row_high = row_high,
+        .power = power,
+        .ahead_sphere = ahead_sphere,
+        .gap_room_sphere = gap_room_sphere,
+        .plain_gap_sphere = plain_gap_sphere,
+        .most_half_sphere = most_half_sphere,
+        .most_half_sphere_1 = most_half_sphere_1,
+        .most_half_sphere_2 = most_half_sphere_2,
+        .outline_left_sphere = outline_left_sphere,
+    };
+    return carried;
+}
+
+/* What does not change within a row. */
+typedef struct {
+    double y, s_row, tilt_row, n_y_row, n_z_row, ahead_row;
+    double_double x_left, x_right;
+} span_row;
+
+SYMRENDER_INLINE span_row span_row_of(double y, const span_sphere *ball, const span_frame *f)
+{
+    /* silhouette [16 call] */
+    /* alpha times the span's middle */
+    const double_double row_mid = dd_mul(ball->offset_x,
+        dd_add(dd_mul_double(ball->offset_y, y), ball->row_mid_sphere));
+    /* by how much the row misses the centre */
+    const double_double row_gap = dd_add(dd_mul_double(ball->depth, y), ball->row_gap_sphere);
+    /* positive where the plane through eye and row cuts the sphere */
+    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->row_disc_frame), dd_mul(row_gap, row_gap));
+    /* alpha times half the span's length */
+    const double_double row_half = dd_sqrt(dd_positive_part(dd_mul(row_disc, ball->row_half_sphere)));
+    /* the row's hits are x_left <= x <= x_right */
+    const double_double x_left = dd_mul(dd_sub(row_mid, row_half), ball->x_left_sphere);
+    const double_double x_right = dd_mul(dd_add(row_mid, row_half), ball->x_left_sphere);
+
+    /* ray and sphere [1 mul] */
+    const double share_1 = y * y;
+    const double s_row = share_1;   /* what is the same for a row in s */
+
+    /* normal [3 mul 2 add] */
+    const double dy = y - ball->image_y.hi - ball->image_y.lo;
+    const double tilt_row = ball->image_x.hi * dy;   /* what is the same for a row in tilt */
+    const double n_y_row = f->focal * dy;   /* what is the same for a row in n_y */
+    const double n_z_row = y * dy;   /* what is the same for a row in n_z */
+
+    /* distance [1 mul] */
+    const double share_3 = y * ball->offset_y.hi;
+    const double ahead_row = share_3;   /* what is the same for a row in ahead */
+
+    const span_row carried = {
+        .y = y,
+        .x_left = x_left,
+        .x_right = x_right,
+        .s_row = s_row,
+        .tilt_row = tilt_row,
+        .n_y_row = n_y_row,
+        .n_z_row = n_z_row,
+        .ahead_row = ahead_row,
+    };
+    return carried;
+}
+
+/* Is there a pixel of this row left that may show the sphere? Asked before the row's own numbers are worked out, which
+ * most spheres behind others are spared. */
+static int span_is_left(
+    double y, const span_sphere *ball, const span_frame *f, const int *owner, double left, double steps, int width)
+{
+    /* ray and sphere [1 mul] */
+    const double share_1 = y * y;
+
+    /* distance [1 mul] */
+    const double share_3 = y * ball->offset_y.hi;
+
+    /* outline [16 mul 10 add 1 sqrt 2 max 2 call] */
+    const double share_8 = fabs(y);
+    /* what rounding may do */
+    const double gap_room = ball->gap_room_sphere + 3.552713678800501e-15 * ball->depth.hi * share_8;
+    const double plain_gap = fabs(y * ball->depth.hi + ball->plain_gap_sphere);   /* |row_gap| in plain float64 */
+    const double less_gap = plain_gap - gap_room;
+    const double least_gap = less_gap > 0.0 ? less_gap : 0.0;   /* at most |row_gap| */
+    /* at least row_disc */
+    const double most_disc = 3.552713678800501e-15 * 281474976710657.0 * share_1 + f->most_disc_frame - least_gap
+        * least_gap;
+    /* at least row_half, and the rounding of the middle */
+    const double most_half = 3.552713678800501e-15 * ball->most_half_sphere
+        * (ball->ahead_sphere + share_8 * ball->most_half_sphere_1) + 3.552713678800501e-15 * 281474976710657.0
+        * sqrt(most_disc > 0.0 ? most_disc : 0.0) * ball->most_half_sphere_2;
+    const double share_9 = ball->ahead_sphere + share_3;
+    /* every hit lies between these */
+    const double outline_left = ball->outline_left_sphere * (ball->offset_x.hi * share_9 - most_half);
+    const double outline_right = ball->outline_left_sphere * (most_half + ball->offset_x.hi * share_9);
+
+    const pixel_span outline
+        = span_between(outline_left * steps - left - 1.0, outline_right * steps - left + 1.0, width);
+    int unowned = 0;
+    for (int i = outline.first; i <= outline.last; ++i)
+        unowned += owner[i] < 0;
+    return unowned;
+}
+
+/* The distance of the hit from the eye, in radii. */
+static inline double span_distance(double x, const span_row *r, const span_sphere *ball, const span_frame *f)
+{
+    /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
+    /* distance to the two ends of the span, not negative inside it */
+    const double from_left = x - r->x_left.hi - r->x_left.lo;
+    const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
+    /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
+    const double facing2 = ball->alpha.hi * chord;
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double d_dot_d = s + f->d_dot_d_frame;
+    const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
+
+    /* distance [2 mul 3 add 1 div 1 sqrt]. t_1 t_2 = (|m|^2 - R^2) / |D|^2 (Vieta) */
+    const double ahead = x * ball->offset_x.hi + ball->ahead_sphere + r->ahead_row;   /* m.D */
+    /* |P - E| in radii: the nearer root as a quotient, free of cancellation */
+    const double hit_distance = sqrt(d_dot_d) * ball->power.hi / (facing + ahead);
+
+    return hit_distance;
+}
+
+/* Does the ray through (x, y) hit sphere k? Settled without rounding, as the sign of a polynomial in the inputs. */
+static int span_hits_exactly(double x, double y, const scene_type *scene, int k)
+{
+    exact_sum sum;
+    exact_sum_clear(&sum);   /* disc */
+    exact_sum_add_product(&sum, -1, scene->center_x[k], scene->center_x[k], scene->eye, scene->eye);
+    exact_sum_add_product(&sum, -1, scene->center_x[k], scene->center_x[k], y, y);
+    exact_sum_add_product(&sum,  2, scene->center_x[k], scene->center_y[k], x, y);
+    exact_sum_add_product(&sum, -2, scene->center_x[k], scene->center_z[k], scene->eye, x);
+    exact_sum_add_product(&sum,  2, scene->center_x[k], scene->eye, scene->eye, x);
+    exact_sum_add_product(&sum, -1, scene->center_y[k], scene->center_y[k], scene->eye, scene->eye);
+    exact_sum_add_product(&sum, -1, scene->center_y[k], scene->center_y[k], x, x);
+    exact_sum_add_product(&sum, -2, scene->center_y[k], scene->center_z[k], scene->eye, y);
+    exact_sum_add_product(&sum,  2, scene->center_y[k], scene->eye, scene->eye, y);
+    exact_sum_add_product(&sum, -1, scene->center_z[k], scene->center_z[k], x, x);
+    exact_sum_add_product(&sum, -1, scene->center_z[k], scene->center_z[k], y, y);
+    exact_sum_add_product(&sum,  2, scene->center_z[k], scene->eye, x, x);
+    exact_sum_add_product(&sum,  2, scene->center_z[k], scene->eye, y, y);
+    exact_sum_add_product(&sum,  1, scene->eye, scene->eye, scene->radius[k], scene->radius[k]);
+    exact_sum_add_product(&sum, -1, scene->eye, scene->eye, x, x);
+    exact_sum_add_product(&sum, -1, scene->eye, scene->eye, y, y);
+    exact_sum_add_product(&sum,  1, scene->radius[k], scene->radius[k], x, x);
+    exact_sum_add_product(&sum,  1, scene->radius[k], scene->radius[k], y, y);
+    return exact_sum_sign(&sum) >= 0;
+}
+
+/* Which sign disc / R^2 has, and in *sure, where it is positive, that rounding cannot have changed it: the error is far
+ * below 2^-40 |D|^2 for every sphere that the plan admits. */
+SYMRENDER_INLINE double span_sight(
+    double x, const span_row *r, const span_sphere *ball, const span_frame *f, double *sure)
+{
+    /* ray and sphere [3 mul 6 add] */
+    /* distance to the two ends of the span, not negative inside it */
+    const double from_left = x - r->x_left.hi - r->x_left.lo;
+    const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const double chord = from_left * to_right;
+    /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
+    const double facing2 = ball->alpha.hi * chord;
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double d_dot_d = s + f->d_dot_d_frame;
+
+    *sure = fabs(facing2) - 0x1p-40 * d_dot_d;
+    return facing2;
+}
+
+/* Does the ray through a point of this row hit sphere k? Its x is column steps from the axis. */
+static int span_hits(double column, double plane_y, const span_row *r, const span_sphere *ball, const span_frame *f,
+    double pixel, double step, const scene_type *scene, int k)
+{
+    double sure;
+    const double sight = span_sight(column * step, r, ball, f, &sure);
+    return sure > 0.0 ? sight > 0.0 : span_hits_exactly(column * pixel, plane_y, scene, k);
+}
+
+/* Fills the arrays for a run of points, the i-th of them at x = (first + i) step. */
+static void span_surface(points *p, int at, int count, double first, double step,
+    const span_row *r, const span_sphere *ball, const span_frame *f)
+{
+    for (int i = 0; i < padded(count); ++i) {
+        const double x = (first + i) * step;
+
+        /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
+        /* distance to the two ends of the span, not negative inside it */
+        const double from_left = x - r->x_left.hi - r->x_left.lo;
+        const double to_right = r->x_right.hi - x + r->x_right.lo;
+        const double chord = from_left * to_right;
+        /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
+        const double facing2 = ball->alpha.hi * chord;
+        const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+        const double d_dot_d = s + f->d_dot_d_frame;
+        /* -n.D, how far the surface faces the ray: root / R */
+        const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);
+
+        /* normal [15 mul 9 add 1 div] */
+        const double inv_d2 = 1.0 / d_dot_d;
+        const double dx = x - ball->image_x.hi - ball->image_x.lo;   /* the pixel seen from the image of the centre */
+        const double tilt = f->tilt_frame * (r->tilt_row - dx * ball->image_y.hi);
+        /* the foot point (D x (D x m)) / |D|^2 lies on the ray, nearest to the centre; n is it less facing D /
+         * |D|^2 */
+        const double n_x = inv_d2 * (ball->depth.hi * (f->focal * dx - r->y * tilt) - x * facing);
+        const double n_y = inv_d2 * (ball->depth.hi * (x * tilt + r->n_y_row) - r->y * facing);
+        const double n_z = inv_d2 * (f->focal * facing + ball->depth.hi * (x * dx + r->n_z_row));
+
+        /* specular [4 mul 3 add] */
+        const double bounce = 2.0 * facing;
+        /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
+        const double mirror_x = x + n_x * bounce;
+        const double mirror_y = r->y + n_y * bounce;
+        const double mirror_z = n_z * bounce - f->focal;
+
+        p->n_x[at + i] = n_x;
+        p->n_y[at + i] = n_y;
+        p->n_z[at + i] = n_z;
+        p->mirror_x[at + i] = mirror_x;
+        p->mirror_y[at + i] = mirror_y;
+        p->mirror_z[at + i] = mirror_z;
+        p->inv_d2[at + i] = inv_d2;
+    }
+}
+
+/* ---- light ---- */
+
+enum { DIFFUSE = 1, SPECULAR = 2, GATED = 4 };   /* terms of a lamp */
+
+/* A light as one receiver has it. */
+typedef struct {
+    double lamp_x, lamp_y, lamp_z;   /* its place from the receiver's origin, in its unit; or its direction */
+    double nearness;                 /* 1; 0 for a light in parallel */
+    double diffuse_gain[CHANNELS], specular_gain[CHANNELS];   /* I_L k_d, I_L k_s */
+    int light, terms;
+} lamp;
+
+static lamp lamp_of(const scene_type *scene, int k, int light, int terms)
+{
+    lamp l = {.nearness = scene->nearness[light], .light = light, .terms = terms};
+    if (l.nearness > 0.0) {
+        /* units of length, powers of two [2 call] */
+        const int world_exponent = unit_exponent(scene->radius[k]);   /* R 2^k in [1, 2) */
+        const double radius = ldexp(scene->radius[k], world_exponent);
+
+        /* light [3 add 3 div 4 call] */
+        const double from_center_x = scene->light_x[light] - scene->center_x[k];   /* L - C */
+        const double from_center_y = scene->light_y[light] - scene->center_y[k];
+        const double from_center_z = scene->light_z[light] - scene->center_z[k];
+        /* farther than 2^60 R a light shines in parallel */
+        const int lamp_exponent = light_exponent(world_exponent, scene->radius[k], from_center_x, from_center_y,
+            from_center_z, 60);
+        const double lamp_x = ldexp(from_center_x, lamp_exponent) / radius;   /* (L - C) / R */
+        const double lamp_y = ldexp(from_center_y, lamp_exponent) / radius;
+        const double lamp_z = ldexp(from_center_z, lamp_exponent) / radius;
+
+        l.lamp_x = lamp_x;
+        l.lamp_y = lamp_y;
+        l.lamp_z = lamp_z;
+    } else {
+        l.lamp_x = scene->light_x[light];
+        l.lamp_y = scene->light_y[light];
+        l.lamp_z = scene->light_z[light];
+    }
+    for (int c = 0; c < CHANNELS; ++c) {
+        const double intensity = scene->light_intensity[CHANNELS * light + c];
+        l.diffuse_gain[c] = (intensity * scene->diffuse[CHANNELS * k + c]);
+        l.specular_gain[c] = (intensity * scene->specular[CHANNELS * k + c]);
+    }
+    return l;
+}
+
+struct scene_gated_shadow_double_frame {
+    const scene_type *scene;
+    symrender_grid grid;
+    double white;
+    span_frame span;
+    span_sphere *spans;   /* [visible] */
+    int *row_first, *row_last;   /* [visible] the rows that may show a sphere */
+    lamp *lamps;
+};
+
+/* w from every point of the run to its lamp. */
+static void reach(points *p, const run *r, const lamp *l)
+{
+    const double lamp_x = l->lamp_x, lamp_y = l->lamp_y, lamp_z = l->lamp_z, nearness = l->nearness;
+    for (int i = r->at; i < r->at + padded(r->count); ++i) {
+        /* light [6 mul 5 add] */
+        /* w = (L - P) in the receiver's unit; nearness is 0 for a light in parallel, else 1 */
+        const double w_x = lamp_x - nearness * p->n_x[i];
+        const double w_y = lamp_y - nearness * p->n_y[i];
+        const double w_z = lamp_z - nearness * p->n_z[i];
+        const double w2 = w_x * w_x + w_y * w_y + w_z * w_z;   /* |w|^2 */
+
+        p->w_x[i] = w_x;
+        p->w_y[i] = w_y;
+        p->w_z[i] = w_z;
+        p->w2[i] = w2;
+        p->light[i] = 1.0;
+    }
+}
+
+/* max(0, n.l) of points that have their w. */
+static void shade_matte(points *p, int begin, int end)
+{
+    for (int i = begin; i < end; ++i) {
+        /* light [4 mul 2 add 1 div 1 sqrt] */
+        const double inv_w2 = 1.0 / p->w2[i];
+        /* n.l = n.w / |w| */
+        const double n_dot_l = (p->n_x[i] * p->w_x[i] + p->n_y[i] * p->w_y[i] + p->n_z[i] * p->w_z[i]) * sqrt(inv_w2);
+
+        /* diffuse [1 max 1 select]. Phong 1975, Illumination for computer generated pictures */
+        /* max(0, n.l); a light at the point itself adds nothing */
+        const double cosine = p->w2[i] > 0.0 ? (n_dot_l > 0.0 ? n_dot_l : 0.0) : 0.0;
+
+        p->cosine[i] = cosine;
+    }
+}
+
+/* max(0, n.l) and max(0, r.v)^n of points that have their w. */
+static void shade_glossy(points *p, int begin, int end)
+{
+    for (int i = begin; i < end; ++i) {
+        /* light [4 mul 2 add 1 div 1 sqrt] */
+        const double inv_w2 = 1.0 / p->w2[i];
+        /* n.l = n.w / |w| */
+        const double n_dot_l = (p->n_x[i] * p->w_x[i] + p->n_y[i] * p->w_y[i] + p->n_z[i] * p->w_z[i]) * sqrt(inv_w2);
+
+        /* specular [16 mul 7 add 2 select 1 call]. Phong 1975, Illumination for computer generated pictures */
+        /* r.v = w . mirror / (|w| |D|) */
+        const double w_dot_mirror = p->mirror_x[i] * p->w_x[i] + p->mirror_y[i] * p->w_y[i] + p->mirror_z[i]
+            * p->w_z[i];
+        const double inv_w2_d2 = p->inv_d2[i] * inv_w2;
+        const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
+        /* w x mirror, short where the highlight is */
+        const double side_x = p->mirror_z[i] * p->w_y[i] - p->mirror_y[i] * p->w_z[i];
+        const double side_y = p->mirror_x[i] * p->w_z[i] - p->mirror_z[i] * p->w_x[i];
+        const double side_z = p->mirror_y[i] * p->w_x[i] - p->mirror_x[i] * p->w_y[i];
+        /* 1 - (r.v)^2, accurate where r.v is near 1 */
+        const double sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
+        const double highlight = power_of_cosine(cos2, sin2, p->shininess[i]);   /* max(0, r.v)^n where r.v > 0 */
+        const double zero_power = p->shininess[i] == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+        const double leaf = w_dot_mirror > 0.0 ? highlight : zero_power;   /* max(0, r.v)^n */
+
+        /* diffuse [1 max 1 select]. Phong 1975, Illumination for computer generated pictures */
+        const double share_1 = p->w2[i] > 0.0;
+        /* max(0, n.l); a light at the point itself adds nothing */
+        const double cosine = share_1 ? (n_dot_l > 0.0 ? n_dot_l : 0.0) : 0.0;
+
+        /* specular [1 select] */
+        const double lobe = share_1 ? leaf : 0.0;
+
+        p->cosine[i] = cosine;
+        p->lobe[i] = lobe;
+    }
+}
+
+/* The light that reaches each point of the run past the spheres that may stand before it. Returns 0 if it is none. */
+static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type *scene)
+{
+    const int k = r->receiver;
+    const double per_unit = 1.0 / scene->radius[k];
+    for (int q = scene->blockers_begin[r->lamp]; q < scene->blockers_begin[r->lamp + 1]; ++q) {
+        const int blocker = scene->blockers[q];
+        const double gap_x = (scene->center_x[blocker] - scene->center_x[k]) * per_unit;
+        const double gap_y = (scene->center_y[blocker] - scene->center_y[k]) * per_unit;
+        const double gap_z = (scene->center_z[blocker] - scene->center_z[k]) * per_unit;
+        const double ratio = scene->radius[blocker] * per_unit, ratio2 = ratio * ratio;
+        const double past_x = l->lamp_x - gap_x, past_y = l->lamp_y - gap_y, past_z = l->lamp_z - gap_z;
+        const int is_within = past_x * past_x + past_y * past_y + past_z * past_z < ratio2;
+        const double far = l->nearness > 0.0 && !is_within ? 1.0 : INFINITY;
+        for (int i = r->at; i < r->at + padded(r->count); ++i) {
+            /* shadow [14 mul 12 add 1 select]. Lagrange's identity |m|^2 |D|^2 - (m.D)^2 = |m x D|^2 */
+            const double b_x = gap_x - p->n_x[i];   /* b, the blocker's centre seen from the point */
+            const double b_y = gap_y - p->n_y[i];
+            const double b_z = gap_z - p->n_z[i];
+            const double cross_x = p->w_z[i] * b_y - p->w_y[i] * b_z;   /* b x w */
+            const double cross_y = p->w_x[i] * b_z - p->w_z[i] * b_x;
+            const double cross_z = p->w_y[i] * b_x - p->w_x[i] * b_y;
+            const double toward = p->w_x[i] * b_x + p->w_y[i] * b_y + p->w_z[i] * b_z;   /* b.w */
+            /* positive where the line to the light meets the blocker */
+            const double inside2 = ratio2 * p->w2[i] - cross_x * cross_x - cross_y * cross_y - cross_z * cross_z;
+            /* no light where it does so between point and light */
+            const double shade = (((inside2 > 0.0) & (toward > 0.0)) & (far * p->w2[i] - toward > 0.0)) ? 0.0
+                : p->light[i];
+
+            p->light[i] = shade;
+        }
+    }
+    if (scene->blockers_begin[r->lamp] == scene->blockers_begin[r->lamp + 1])
+        return 1;
+    int lit = 0;
+    for (int i = r->at; i < r->at + r->count; ++i)
+        lit += p->light[i] > 0.0;
+    return lit;
+}
+
+/* Adds what the run's lamp brings. */
+static void accumulate(points *p, const run *r, const lamp *l)
+{
+    if (l->terms & GATED)
+        for (int i = r->at; i < r->at + padded(r->count); ++i)
+            p->lobe[i] = p->cosine[i] > 0.0 ? p->lobe[i] : 0.0;
+    for (int c = 0; c < CHANNELS; ++c) {
+        const double diffuse_gain = l->diffuse_gain[c], specular_gain = l->specular_gain[c];
+        if (l->terms & SPECULAR)
+            for (int i = r->at; i < r->at + padded(r->count); ++i)
+                p->value[c][i] += p->light[i] * (diffuse_gain * p->cosine[i] + specular_gain * p->lobe[i]);
+        else
+            for (int i = r->at; i < r->at + padded(r->count); ++i)
+                p->value[c][i] += p->light[i] * (diffuse_gain * p->cosine[i]);
+    }
+}
+
+/* The terms that the run's lamp adds, one by one, for pixels from `pixel` on. */
+static void write_terms(
+    const points *p, const run *r, const lamp *l, const layer_set *layers, size_t pixel, size_t pixels)
+{
+    for (int c = 0; c < CHANNELS; ++c)
+        for (int i = 0; i < r->count; ++i) {
+            const size_t place = CHANNELS * (pixels * (size_t)l->light + pixel + (size_t)i) + (size_t)c;
+            const double light = p->light[r->at + i];
+            if (layers->diffuse)
+                layers->diffuse[place] = light * l->diffuse_gain[c] * p->cosine[r->at + i];
+            if (layers->specular && l->terms & SPECULAR)
+                layers->specular[place] = light * l->specular_gain[c] * p->lobe[r->at + i];
+        }
+}
+
+/* The intensity of points that have their geometry. `layers` may ask for its terms, for pixels from `pixel` on. */
+static void shade(points *p, const frame *h, int bounces, const layer_set *layers, size_t pixel, size_t pixels)
+{
+    const scene_type *scene = h->scene;
+    for (const run *r = p->run; r < p->run + p->runs; ++r)
+        for (int c = 0; c < CHANNELS; ++c) {
+            const double ambient = scene->ambient[CHANNELS * r->receiver + c];
+            for (int i = r->at; i < r->at + padded(r->count); ++i)
+                p->value[c][i] = ambient;
+        }
+    for (const run *r = p->run; r < p->run + p->runs; ++r) {
+        const double shininess = scene->shininess[r->receiver];
+        for (int i = r->at; i < r->at + padded(r->count); ++i)
+            p->shininess[i] = shininess;
+    }
+
+    /* the turn-th lamp of every run: points of different receivers share the loops */
+    for (int turn = 0;; ++turn) {
+        int is_last = 1;
+        for (run *r = p->run; r < p->run + p->runs; ++r) {
+            r->terms = 0;
+            r->lamp = scene->lamps_begin[r->receiver] + turn;
+            if (r->lamp >= scene->lamps_begin[r->receiver + 1])
+                continue;
+            is_last = 0;
+            const lamp *l = &h->lamps[r->lamp];
+            reach(p, r, l);
+            if (!cast_shadows(p, r, l, scene))
+                continue;
+            r->terms = l->terms;
+        }
+        if (is_last)
+            break;
+        for (int first = 0, next; first < p->runs; first = next) {
+            const int is_glossy = p->run[first].terms & SPECULAR, is_lit = p->run[first].terms != 0;
+            next = first + 1;
+            while (next < p->runs
+                   && (p->run[next].terms & SPECULAR) == is_glossy && (p->run[next].terms != 0) == is_lit)
+                ++next;
+            const int begin = p->run[first].at, end = p->run[next - 1].at + padded(p->run[next - 1].count);
+            if (is_glossy)
+                shade_glossy(p, begin, end);
+            else if (is_lit)
+                shade_matte(p, begin, end);
+        }
+        for (const run *r = p->run; r < p->run + p->runs; ++r)
+            if (r->terms) {
+                accumulate(p, r, &h->lamps[r->lamp]);
+                if (layers)
+                    write_terms(p, r, &h->lamps[r->lamp], layers, pixel + (size_t)r->place, pixels);
+            }
+    }
+    (void)bounces;
+}
+
+frame *scene_gated_shadow_double_prepare(const scene_type *scene, const symrender_grid *grid)
+{
+    frame *h = array(1, sizeof *h);
+    if (!h)
+        return NULL;
+    h->scene = scene;
+    h->grid = *grid;
+    h->white = grid->white;
+    h->span = span_frame_of(scene);
+    const size_t visible = (size_t)scene->visible;
+    h->row_first = array(visible, sizeof *h->row_first);
+    h->row_last = array(visible, sizeof *h->row_last);
+    h->spans = array(visible, sizeof *h->spans);
+    h->lamps = array((size_t)scene->lamps_begin[scene->receivers], sizeof *h->lamps);
+    if (!h->spans || !h->row_first || !h->row_last || !h->lamps) {
+        scene_gated_shadow_double_release(h);
+        return NULL;
+    }
+    for (int k = 0; k < scene->visible; ++k) {
+        h->row_first[k] = 0;
+        h->row_last[k] = grid->height - 1;
+        h->spans[k] = span_sphere_of(scene, k, &h->span);
+        /* the silhouette's rows, and one more on each side for what rounding may do */
+        const double step = grid->pixel * h->span.plane_unit, top = 0.5 * grid->height - 0.5;
+        const double first = top - h->spans[k].row_high / step - 1.5, last = top - h->spans[k].row_low / step + 1.5;
+        if (first > 0.0)
+            h->row_first[k] = first < grid->height ? (int)first : grid->height;
+        if (last < grid->height - 1)
+            h->row_last[k] = last > 0.0 ? (int)last : -1;
+    }
+    for (int k = 0; k < scene->receivers; ++k)
+        for (int l = scene->lamps_begin[k]; l < scene->lamps_begin[k + 1]; ++l)
+            h->lamps[l] = lamp_of(scene, k, scene->lamp_light[l], scene->lamp_terms[l]);
+    return h;
+}
+
+void scene_gated_shadow_double_release(frame *h)
+{
+    if (!h)
+        return;
+    free(h->spans);
+    free(h->row_first);
+    free(h->row_last);
+    free(h->lamps);
+    free(h);
+}
+
+/* ---- the rows of an image ---- */
+
+/* What a call of rows or points works in. */
+typedef struct {
+    points *points;     /* one for each level of mirrors */
+    int *owner;         /* [width] which of the row's spheres a pixel shows; then the plane's materials; -1: none */
+    int *start;         /* [rows + 1] where each row's list of spheres begins in */
+    int *active;        /* the spheres that may show in each row, front to back */
+    span_row *span_rows;   /* [most in a row] */
+} workspace;
+
+static void drop(workspace *w)
+{
+    free(w->points);
+    free(w->owner);
+    free(w->start);
+    free(w->active);
+    free(w->span_rows);
+}
+
+/* Memory for these rows, and their lists of spheres. Returns 0 where there is none. */
+static int take(workspace *w, const frame *h, int row_begin, int row_end, int width)
+{
+    const workspace none = {0};
+    *w = none;
+    w->points = array(1, sizeof *w->points);
+    w->owner = array((size_t)width, sizeof *w->owner);
+    if (!w->points || !w->owner)
+        return 0;
+    const int rows = row_end - row_begin;
+    size_t most = 0;
+    w->start = array((size_t)rows + 2, sizeof *w->start);
+    if (!w->start)
+        return 0;
+    for (int k = 0; k < h->scene->visible; ++k)
+        for (int j = h->row_first[k] > row_begin ? h->row_first[k] : row_begin; j <= h->row_last[k] && j < row_end; ++j)
+            ++w->start[j - row_begin + 2];
+    for (int j = 0; j < rows; ++j) {
+        most = (size_t)w->start[j + 2] > most ? (size_t)w->start[j + 2] : most;
+        w->start[j + 2] += w->start[j + 1];
+    }
+    w->active = array((size_t)w->start[rows + 1], sizeof *w->active);
+    w->span_rows = array(most, sizeof *w->span_rows);
+    if (!w->active || !w->span_rows)
+        return 0;
+    for (int k = 0; k < h->scene->visible; ++k)
+        for (int j = h->row_first[k] > row_begin ? h->row_first[k] : row_begin; j <= h->row_last[k] && j < row_end; ++j)
+            w->active[w->start[j - row_begin + 1]++] = k;
+    return 1;
+}
+
+/* The same for points, one at a time: two slots. */
+static int take_for_points(workspace *w, const frame *h)
+{
+    const workspace none = {0};
+    *w = none;
+    w->points = array(1, sizeof *w->points);
+    (void)h;
+    w->span_rows = array(2, sizeof *w->span_rows);
+    return w->points != NULL && w->span_rows != NULL;
+}
+
+/* The row's own numbers of sphere k, in the slot of the workspace that its place in the row's list gives it. */
+static void enter_row(workspace *w, const frame *h, int slot, int k, double y)
+{
+    w->span_rows[slot] = span_row_of(y, &h->spans[k], &h->span);
+}
+
+static int hits(
+    const workspace *w, const frame *h, int slot, int k, double column, double plane_y, double pixel, double step)
+{
+    return span_hits(column, plane_y, &w->span_rows[slot], &h->spans[k], &h->span, pixel, step, h->scene, k);
+}
+
+/* Distance of sphere k from the eye along the ray through x, in scene units. */
+static double depth_of(const workspace *w, const frame *h, int slot, int k, double x)
+{
+    const double radii = span_distance(x, &w->span_rows[slot], &h->spans[k], &h->span);
+    return radii * h->scene->radius[k];
+}
+
+/* Depth, normal, index and ambient term of the last run, which the pixels of one owner in this row make up. */
+static void write_geometry(const points *p, const workspace *w, const frame *h, const layer_set *layers,
+    size_t row, int slot, double left, double step)
+{
+    const scene_type *scene = h->scene;
+    const run *r = &p->run[p->runs - 1];
+    for (int i = 0; i < r->count; ++i) {
+        const size_t place = row + (size_t)(r->place + i);
+        if (layers->index)
+            layers->index[place] = r->receiver;
+        if (layers->normal) {
+            layers->normal[3 * place] = p->n_x[r->at + i];
+            layers->normal[3 * place + 1] = p->n_y[r->at + i];
+            layers->normal[3 * place + 2] = p->n_z[r->at + i];
+        }
+        if (layers->ambient)
+            for (int c = 0; c < CHANNELS; ++c)
+                layers->ambient[CHANNELS * place + (size_t)c] = scene->ambient[CHANNELS * r->receiver + c];
+        if (layers->depth) {
+            const double x = (r->place + i + left) * step;
+            layers->depth[place] = depth_of(w, h, slot, r->receiver, x);
+        }
+    }
+}
+
+/* Shades the points at hand and writes them to the row. */
+static void flush(points *p, const frame *h, double *restrict out, const layer_set *layers, size_t row)
+{
+    const size_t pixels = (size_t)h->grid.width * (size_t)h->grid.height;
+    shade(p, h, 0, layers, row, pixels);
+    const double white = h->white;
+    for (int c = 0; c < CHANNELS; ++c)
+        for (int i = 0; i < p->count; ++i)
+            p->value[c][i] = p->value[c][i] > white ? white : p->value[c][i];
+    for (const run *r = p->run; r < p->run + p->runs; ++r)
+        memcpy(out + r->place, p->value[0] + r->at, (size_t)r->count * sizeof *out);
+    p->count = p->runs = 0;
+}
+
+/* Geometry of a run of points of the sphere in a slot of the row, or of the plane. */
+static void surface(points *p, const workspace *w, const frame *h, int slot, int receiver, int count,
+    double first, double step)
+{
+    run *r = &p->run[p->runs++];
+    r->receiver = receiver;
+    r->at = p->count;
+    r->count = count;
+    p->count += padded(count);
+    span_surface(p, r->at, count, first, step, &w->span_rows[slot], &h->spans[receiver], &h->span);
+}
+
+int scene_gated_shadow_double_rows(
+    double *image, ptrdiff_t stride, const frame *h, const layer_set *layers, int row_begin, int row_end)
+{
+    const scene_type *scene = h->scene;
+    const int width = h->grid.width;
+    const double unit = h->span.plane_unit;
+    const double pixel = h->grid.pixel, step = pixel * unit, steps = 1.0 / step;
+    const double left = 0.5 - 0.5 * width, top = 0.5 * h->grid.height - 0.5;
+    double background[CHANNELS];
+    for (int c = 0; c < CHANNELS; ++c)
+        background[c] = scene->background[c] > h->grid.white ? h->white : scene->background[c];
+    workspace w;
+    if (!take(&w, h, row_begin, row_end, width)) {
+        drop(&w);
+        return -1;
+    }
+    for (int j = row_begin; j < row_end; ++j) {
+        double *out = image + j * stride;
+        const double plane_y = (top - j) * pixel;
+        const size_t row = (size_t)j * (size_t)width;
+        for (int i = 0; i < width; ++i)
+            w.owner[i] = -1;
+        const int *active = w.active + w.start[j - row_begin];
+        const int count = w.start[j - row_begin + 1] - w.start[j - row_begin];
+        int left_over = width;
+        for (int slot = 0; slot < count && left_over > 0; ++slot) {
+            const int k = active[slot];
+            if (!span_is_left(plane_y * unit, &h->spans[k], &h->span, w.owner, left, steps, width))
+                continue;
+            enter_row(&w, h, slot, k, plane_y * unit);
+
+            /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
+            const span_row *r = &w.span_rows[slot];
+            pixel_span span = span_between(r->x_left.hi * steps - left, r->x_right.hi * steps - left, width);
+            while (span.first > 0 && hits(&w, h, slot, k, span.first - 1 + left, plane_y, pixel, step))
+                --span.first;
+            while (span.last < width - 1 && hits(&w, h, slot, k, span.last + 1 + left, plane_y, pixel, step))
+                ++span.last;
+            while (span.first <= span.last && !hits(&w, h, slot, k, span.first + left, plane_y, pixel, step))
+                ++span.first;
+            while (span.last >= span.first && !hits(&w, h, slot, k, span.last + left, plane_y, pixel, step))
+                --span.last;
+            int painted = 0;
+            for (int i = span.first; i <= span.last; ++i) {
+                painted += w.owner[i] < 0;
+                w.owner[i] = w.owner[i] < 0 ? slot : w.owner[i];
+            }
+            left_over -= painted;
+        }
+
+        /* runs of pixels of one owner: shaded together with what follows, as many at a time as there is room for */
+        points *p = w.points;
+        p->count = p->runs = 0;
+        for (int i = 0, end; i < width; i = end) {
+            const int owner = w.owner[i];
+            end = i + 1;
+            while (end < width && w.owner[end] == owner)
+                ++end;
+            if (owner < 0) {
+                for (int q = i; q < end; ++q) {
+                    for (int c = 0; c < CHANNELS; ++c) {
+                        out[CHANNELS * q + c] = background[c];
+                        if (layers && layers->background)
+                            layers->background[CHANNELS * (row + (size_t)q) + (size_t)c] = scene->background[c];
+                    }
+                }
+                if (layers && layers->depth)
+                    for (int q = i; q < end; ++q)
+                        layers->depth[row + (size_t)q] = INFINITY;
+                if (layers && layers->index)
+                    for (int q = i; q < end; ++q)
+                        layers->index[row + (size_t)q] = -1;
+                continue;
+            }
+            const int receiver = active[owner];
+            for (int begin = i, some; begin < end; begin += some) {
+                if (p->count == POINTS)
+                    flush(p, h, out, layers, row);
+                some = end - begin < POINTS - p->count ? end - begin : POINTS - p->count;
+                p->run[p->runs].place = begin;
+                surface(p, &w, h, owner, receiver, some, begin + left, step);
+                if (layers)
+                    write_geometry(p, &w, h, layers, row, owner, left, step);
+            }
+        }
+        if (p->count > 0)
+            flush(p, h, out, layers, row);
+    }
+    drop(&w);
+    return 0;
+}
+
+int scene_gated_shadow_double_points(
+    double *values, const double *x, const double *y, ptrdiff_t count, const frame *h)
+{
+    const scene_type *scene = h->scene;
+    const double plane_unit = h->span.plane_unit;
+    workspace w;
+    if (!take_for_points(&w, h)) {
+        drop(&w);
+        return -1;
+    }
+    points *p = w.points;
+    double *out = values;
+    for (ptrdiff_t i = 0; i < count; ++i) {
+        const double unit = point_unit(plane_unit, x[i], y[i], 0x1p200);
+        int owner = -1;
+        /* two slots: what the point shows so far, and the sphere that is tried */
+        int active[2] = {0, 0};
+        for (int k = 0; k < scene->visible; ++k) {
+            active[1] = k;
+            enter_row(&w, h, 1, k, y[i] * unit);
+            if (!hits(&w, h, 1, k, x[i], y[i], 1.0, unit))
+                continue;
+            owner = 0;
+            active[0] = k;
+            w.span_rows[0] = w.span_rows[1];
+            break;
+        }
+        int receiver = owner < 0 ? -1 : active[0];
+        if (receiver < 0) {
+            for (int c = 0; c < CHANNELS; ++c) {
+                const double value = scene->background[c];
+                values[CHANNELS * i + c] = value > h->white ? h->white : value;
+            }
+            continue;
+        }
+        if (p->count == POINTS || i - (out - values) / CHANNELS > 0x3fffffff) {
+            flush(p, h, out, NULL, 0);
+            out = values + CHANNELS * i;
+        }
+        p->run[p->runs].place = (int)(i - (out - values) / CHANNELS);
+        surface(p, &w, h, 0, receiver, 1, x[i] * unit, 1.0);
+    }
+    if (p->count > 0)
+        flush(p, h, out, NULL, 0);
+    drop(&w);
+    return 0;
+}
