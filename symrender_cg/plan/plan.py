@@ -14,7 +14,7 @@ from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Final
 
-from symrender_cg.errors import ArgumentError
+from symrender_cg.errors import ArgumentError, OutsidePlanError
 from symrender_cg.plan.bounds import (
     require_single,
     require_single_view,
@@ -103,6 +103,15 @@ class Plan:
         """How much any pixel may change by what is left out although it is not absent; at most max_error."""
         budget = self.examination.budget if self.max_error > 0.0 else None
         return 0.0 if budget is None else budget.diffuse_bound + budget.specular_bound + budget.depth_bound
+
+    @cached_property
+    def fits_single(self) -> bool:
+        """Whether kernels that shade in float32 are proved right for the scene."""
+        try:
+            _require_single(self)
+        except OutsidePlanError:
+            return False
+        return True
 
     def findings(self, name: str) -> tuple[Finding, ...]:
         """What was found for each subject of an effect, such as `spheres[3] on spheres[0] from lights[1]`.
@@ -213,8 +222,11 @@ def plan(scene: Scene, *, force: Iterable[str] = (), aspect: float | None = None
 
 def require_format(found: Plan, shading: str) -> None:
     """Raises OutsidePlanError where kernels that shade in this format are not proved right for the plan's scene."""
-    if shading != "float32":
-        return
+    if shading == "float32" and not found.fits_single:
+        _require_single(found)
+
+
+def _require_single(found: Plan) -> None:
     require_single_view(found.scene)
     if found.arrangement is None:
         require_single(found.scene, 0, at_eye=found.needs("front_test"))
