@@ -18,13 +18,11 @@ from symrender_cg.plan import effects
 from symrender_cg.plan import plan as planning
 from symrender_cg.plan.arrangement import arrange
 from symrender_cg.plan.examination import examine, look
-from symrender_cg.plan.findings import FINDERS
 from symrender_cg.plan.lamps import caps_apart
 from symrender_cg.plan.measures import Measures, measure
 from symrender_cg.plan.mirrors import below_horizon
 from symrender_cg.plan.plan import plan
 from symrender_cg.plan.shadows import misses_sphere
-from symrender_cg.plan.summary import TALLIES, summarise
 from symrender_cg.plan.visibility import hidden
 from symrender_cg.reference import brute_force
 from symrender_cg.scene import Camera, DirectionalLight, Phong, Plane, PointLight, Scene, Sphere
@@ -235,7 +233,10 @@ def test_without_shadows_there_are_no_blockers_and_no_dark_lights() -> None:
 def test_every_effect_has_findings_and_a_tally() -> None:
     names = [entry.name for entry in effects.EFFECTS]
     assert len(set(names)) == len(names)
-    assert set(names) == set(FINDERS) == set(TALLIES)
+    found = examine(look(random_scene(1).in_camera_frame(), aspect=1.0), 0.0)
+    for entry in effects.EFFECTS:
+        assert all(finding.reason for finding in entry.find(found)), entry.name
+        assert entry.tally(found).reason, entry.name
 
 
 KEPT: dict[str, Callable[[Any], int]] = {
@@ -260,7 +261,7 @@ def test_findings_are_what_the_arrangement_has() -> None:
         seen = [finding.needed for finding in found.findings("mirror") if " in " in finding.subject]
         assert sum(seen) == len(arrangement.mirrors) + int(arrangement.mirror_plane.sum())
         for decision in found.decisions:
-            subjects = summarise(decision.effect.name, found.examination).subjects
+            subjects = effects.effect(decision.effect.name).tally(found.examination).subjects
             assert subjects == len(found.findings(decision.effect.name)), (seed, decision)
             for finding in found.findings(decision.effect.name):
                 assert finding.reason

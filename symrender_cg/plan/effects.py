@@ -1,19 +1,24 @@
 """The registry of effects: what each is, what leaving it out removes, and under which condition it provably may be.
 
 Two groups. SPHERE_EFFECTS decide the kernel of one sphere and one light; each is examined exactly, in rationals, on the
-camera-frame float64 numbers. SCENE_EFFECTS decide the arrangement of everything else, subject by subject (see
-`findings`). Tangency counts as needed. Adding an effect is adding an entry here, its place in the examination and in
-the derivation, and its tests.
+camera-frame float64 numbers. SCENE_EFFECTS decide the arrangement of everything else, subject by subject. An entry
+names what finds an effect's subjects with their inequalities, and what tallies them; adding an effect is adding an
+entry and what it names, a part of the derivation, and its tests. Tangency counts as needed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Final, Literal
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from symrender_cg.scene import PointLight, Scene
+
+if TYPE_CHECKING:
+    from symrender_cg.plan.examination import Examination
+    from symrender_cg.plan.summary import Tally
 
 Status = Literal["needed", "absent", "bounded"]
 
@@ -47,8 +52,9 @@ class Finding:
 class Effect:
     """One effect: what it is, what leaving it out removes from the kernel, and the condition under which it is absent.
 
-    `examine` is that of SPHERE_EFFECTS. `optional` effects may be forced in; the others are facts of the geometry that
-    no kernel has a use for, or what the shape of the image asks for.
+    `examine` is that of SPHERE_EFFECTS. `find` gives the finding of each subject, `tally` sums them up. `optional`
+    effects may be forced in; the others are facts of the geometry that no kernel has a use for, or what the shape of the
+    image asks for.
     """
 
     name: str
@@ -58,6 +64,17 @@ class Effect:
     optional: bool = True
     condition: str = ""
     source: str = ""
+    find: Callable[[Examination], Iterator[Finding]] = field(kw_only=True)
+    tally: Callable[[Examination], Tally] = field(kw_only=True)
+
+
+def _later(module: str, name: str) -> Callable[[Examination], Any]:
+    """A function of a module of this package that is imported when it is first called: few plans are explained."""
+
+    def call(found: Examination) -> Any:
+        return getattr(import_module(f"symrender_cg.plan.{module}"), name)(found)
+
+    return call
 
 
 def _off_axis(scene: Scene) -> Finding:
@@ -126,13 +143,22 @@ def _self_shadow(scene: Scene) -> Finding:
 
 
 SPHERE_EFFECTS: tuple[Effect, ...] = (
-    Effect("off_axis", "sphere off the axis", "the image of the centre, the tilt of the conic", _off_axis),
+    Effect(
+        "off_axis",
+        "sphere off the axis",
+        "the image of the centre, the tilt of the conic",
+        _off_axis,
+        find=_later("findings", "off_axis"),
+        tally=_later("summary", "off_axis_tally"),
+    ),
     Effect(
         "front_test",
         "sphere at the plane of the eye",
         "the test m.D > 0; a row's hits are one span",
         _front_test,
         condition="depth of the centre > R, and not 256 times farther off the axis",
+        find=_later("findings", "front_test"),
+        tally=_later("summary", "front_test_tally"),
     ),
     Effect(
         "diffuse",
@@ -141,6 +167,8 @@ SPHERE_EFFECTS: tuple[Effect, ...] = (
         _diffuse,
         condition="k_d I = 0, or psi >= phi_E + phi_L: the caps that eye and light see are apart",
         source="Phong 1975",
+        find=_later("lighting_findings", "diffuse_terms"),
+        tally=_later("summary", "diffuse_tally"),
     ),
     Effect(
         "specular",
@@ -149,8 +177,17 @@ SPHERE_EFFECTS: tuple[Effect, ...] = (
         _specular,
         condition="k_s I = 0, or the caps apart where the highlight is gated",
         source="Phong 1975",
+        find=_later("lighting_findings", "specular_terms"),
+        tally=_later("summary", "specular_tally"),
     ),
-    Effect("specular_gate", "gated specular", "the test n.l > 0 of the highlight", _specular_gate),
+    Effect(
+        "specular_gate",
+        "gated specular",
+        "the test n.l > 0 of the highlight",
+        _specular_gate,
+        find=_later("lighting_findings", "gates"),
+        tally=_later("summary", "specular_gate_tally"),
+    ),
     Effect(
         "self_shadow",
         "shadow of the sphere on itself",
@@ -158,6 +195,8 @@ SPHERE_EFFECTS: tuple[Effect, ...] = (
         _self_shadow,
         optional=False,
         condition="convex",
+        find=_later("findings", "self_shadow"),
+        tally=_later("summary", "self_shadow_tally"),
     ),
 )
 
@@ -167,6 +206,8 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "spheres behind the eye",
         "the sphere, from what the eye sees",
         condition="depth of the centre <= -R (exact)",
+        find=_later("findings", "behind_eye"),
+        tally=_later("summary", "behind_eye_tally"),
     ),
     Effect(
         "in_view",
@@ -174,12 +215,16 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "the sphere, from what the eye sees",
         condition="n.m <= -R for the inward unit normal n of one side of the window",
         source="view frustum culling, Clark 1976",
+        find=_later("findings", "in_view"),
+        tally=_later("summary", "in_view_tally"),
     ),
     Effect(
         "hidden",
         "hidden spheres",
         "the sphere, from what the eye sees",
         condition="gamma + beta <= alpha and pow_A(E) < pow_B(E), A and B disjoint; B inside A; the plane between",
+        find=_later("findings", "hidden"),
+        tally=_later("summary", "hidden_tally"),
     ),
     Effect(
         "order",
@@ -187,21 +232,32 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "the comparison of depths; the first hit is the last",
         condition="|C_A - C_B| >= R_A + R_B: the smaller power |E - C|^2 - R^2 is in front on every ray",
         source="power diagrams, Aurenhammer 1987",
+        find=_later("findings", "order"),
+        tally=_later("summary", "order_tally"),
     ),
     Effect(
-        "plane", "the plane", "the plane", condition="n.D >= 0 at the four corners of the window, no mirror shows it"
+        "plane",
+        "the plane",
+        "the plane",
+        condition="n.D >= 0 at the four corners of the window, no mirror shows it",
+        find=_later("findings", "plane"),
+        tally=_later("summary", "plane_tally"),
     ),
     Effect(
         "checker",
         "tiles of the plane",
         "floor and parity",
         condition="equal materials, or the quadrangle that the window cuts out lies in one tile",
+        find=_later("findings", "checker"),
+        tally=_later("summary", "checker_tally"),
     ),
     Effect(
         "lights",
         "lights on surfaces",
         "the light, from the sum on that surface",
         condition="both its terms absent; inside another sphere; on the other side of the plane",
+        find=_later("lighting_findings", "lights"),
+        tally=_later("summary", "lights_tally"),
     ),
     Effect(
         "shadow",
@@ -209,6 +265,8 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "the test of that blocker",
         condition="B misses the hull of the light and A; on the plane: B below it or above the light",
         source="shadow volumes, Crow 1977",
+        find=_later("lighting_findings", "shadows"),
+        tally=_later("summary", "shadow_tally"),
     ),
     Effect(
         "plane_shadow",
@@ -216,6 +274,8 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "the test of the plane",
         optional=False,
         condition="what is seen is on the eye's side of the plane: a light is there too, or dark for every sphere",
+        find=_later("lighting_findings", "plane_shadows"),
+        tally=_later("summary", "plane_shadow_tally"),
     ),
     Effect(
         "mirror",
@@ -223,6 +283,8 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "the test of the mirrored ray against that surface",
         condition="reflect = 0; or below the tangent plane of every visible point; mirror image outside the window",
         source="Whitted 1980",
+        find=_later("mirror_findings", "mirrors"),
+        tally=_later("summary", "mirror_tally"),
     ),
     Effect(
         "mirror_depth",
@@ -230,14 +292,25 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "deeper bounces",
         condition="no longer chain of mirrors that may see one another",
         source="Whitted 1980",
+        find=_later("mirror_findings", "depths"),
+        tally=_later("summary", "mirror_depth_tally"),
     ),
-    Effect("attenuation", "lights that fade with distance", "1 / (a + b l + c l^2)", condition="(a, b, c) = (1, 0, 0)"),
+    Effect(
+        "attenuation",
+        "lights that fade with distance",
+        "1 / (a + b l + c l^2)",
+        condition="(a, b, c) = (1, 0, 0)",
+        find=_later("findings", "attenuation"),
+        tally=_later("summary", "attenuation_tally"),
+    ),
     Effect(
         "directional",
         "lights from a direction",
         "the light's direction as a constant",
         optional=False,
         condition="the light is at a point",
+        find=_later("findings", "directional"),
+        tally=_later("summary", "directional_tally"),
     ),
     Effect(
         "gradient",
@@ -245,14 +318,26 @@ SCENE_EFFECTS: tuple[Effect, ...] = (
         "the background's blend",
         optional=False,
         condition="bottom = top, or one background for all directions",
+        find=_later("findings", "gradient"),
+        tally=_later("summary", "gradient_tally"),
     ),
-    Effect("colour", "colour", "two of three channels", optional=False, condition="every colour of the scene is grey"),
+    Effect(
+        "colour",
+        "colour",
+        "two of three channels",
+        optional=False,
+        condition="every colour of the scene is grey",
+        find=_later("findings", "colour"),
+        tally=_later("summary", "colour_tally"),
+    ),
     Effect(
         "clip",
         "clipping at 1",
         "the upper clamp, when the image is clipped",
         optional=False,
         condition="k_a + sum of I (k_d + k_s), and what mirrors add, <= 1",
+        find=_later("lighting_findings", "clipping"),
+        tally=_later("summary", "clip_tally"),
     ),
 )
 

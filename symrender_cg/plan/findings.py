@@ -8,24 +8,19 @@ to be read. Never done here: a decision.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import combinations
-from typing import Final
 
 import numpy as np
 
-from symrender_cg.plan import lighting_findings as lighting
-from symrender_cg.plan import mirror_findings as mirroring
 from symrender_cg.plan.effects import Finding, reaches_eye
 from symrender_cg.plan.examination import Examination
 from symrender_cg.plan.flags import fades
 from symrender_cg.plan.measures import angle, cone_above, cone_below, norm
 from symrender_cg.scene import DirectionalLight, Gradient
 
-Finder = Callable[[Examination], Iterator[Finding]]
 
-
-def _behind_eye(found: Examination) -> Iterator[Finding]:
+def behind_eye(found: Examination) -> Iterator[Finding]:
     eye = found.measures.scene.camera.eye[2]
     for index, sphere in enumerate(found.measures.scene.spheres):
         depth = eye - sphere.center[2]
@@ -39,7 +34,7 @@ def _behind_eye(found: Examination) -> Iterator[Finding]:
         )
 
 
-def _in_view(found: Examination) -> Iterator[Finding]:
+def in_view(found: Examination) -> Iterator[Finding]:
     measures, aspect = found.measures, found.views.aspect
     for index in range(measures.count):
         subject = f"spheres[{index}]"
@@ -59,7 +54,7 @@ def _in_view(found: Examination) -> Iterator[Finding]:
         yield Finding(not out, text, slack if out else None, subject)
 
 
-def _hidden(found: Examination) -> Iterator[Finding]:
+def hidden(found: Examination) -> Iterator[Finding]:
     views, measures = found.views, found.measures
     unit = measures.unit
     for index in range(measures.count):
@@ -105,7 +100,7 @@ def _covered(found: Examination, index: int) -> Finding:
     )
 
 
-def _order(found: Examination) -> Iterator[Finding]:
+def order(found: Examination) -> Iterator[Finding]:
     measures = found.measures
     i, j, _ = found.views.touching
     touching = set(zip(i.tolist(), j.tolist(), strict=True))
@@ -120,24 +115,24 @@ def _order(found: Examination) -> Iterator[Finding]:
             yield Finding(False, text, gap - reach, subject)
 
 
-def _front_test(found: Examination) -> Iterator[Finding]:
+def front_test(found: Examination) -> Iterator[Finding]:
     for index in np.flatnonzero(found.views.visible).tolist():
         one = reaches_eye(found.measures.scene, index)
         yield Finding(one.needed, one.reason, one.margin, f"spheres[{index}]")
 
 
-def _off_axis(found: Examination) -> Iterator[Finding]:
+def off_axis(found: Examination) -> Iterator[Finding]:
     del found
     yield Finding(True, "the kernel of a scene takes spheres anywhere")
 
 
-def _self_shadow(found: Examination) -> Iterator[Finding]:
+def self_shadow(found: Examination) -> Iterator[Finding]:
     for index in np.flatnonzero(found.matters[: found.measures.count]).tolist():
         text = "convex: where n.l > 0 the way to the light leaves it; where not, diffuse is 0"
         yield Finding(False, text, None, f"spheres[{index}]")
 
 
-def _plane(found: Examination) -> Iterator[Finding]:
+def plane(found: Examination) -> Iterator[Finding]:
     views, measures = found.views, found.measures
     if measures.normal is None:
         yield Finding(False, "the scene has no plane")
@@ -157,7 +152,7 @@ def _plane(found: Examination) -> Iterator[Finding]:
     yield Finding(False, text, lowest, "plane")
 
 
-def _checker(found: Examination) -> Iterator[Finding]:
+def checker(found: Examination) -> Iterator[Finding]:
     plane, measures = found.measures.plane, found.measures
     if plane is None or plane.checker is None:
         yield Finding(False, "the scene has no plane" if plane is None else "the plane has one material")
@@ -172,7 +167,7 @@ def _checker(found: Examination) -> Iterator[Finding]:
         )
 
 
-def _attenuation(found: Examination) -> Iterator[Finding]:
+def attenuation(found: Examination) -> Iterator[Finding]:
     used = np.asarray(np.any(found.lamps.any, axis=0))
     for number, light in enumerate(found.measures.scene.lights):
         subject = f"lights[{number}]"
@@ -187,7 +182,7 @@ def _attenuation(found: Examination) -> Iterator[Finding]:
             yield Finding(needed, text, None, subject)
 
 
-def _directional(found: Examination) -> Iterator[Finding]:
+def directional(found: Examination) -> Iterator[Finding]:
     for number, light in enumerate(found.measures.scene.lights):
         if isinstance(light, DirectionalLight):
             yield Finding(True, "from one direction everywhere", None, f"lights[{number}]")
@@ -195,7 +190,7 @@ def _directional(found: Examination) -> Iterator[Finding]:
             yield Finding(False, f"at the point {light.position}", None, f"lights[{number}]")
 
 
-def _gradient(found: Examination) -> Iterator[Finding]:
+def gradient(found: Examination) -> Iterator[Finding]:
     background = found.measures.scene.background
     if not isinstance(background, Gradient):
         yield Finding(False, f"the background is {background} in every direction")
@@ -205,34 +200,8 @@ def _gradient(found: Examination) -> Iterator[Finding]:
         yield Finding(True, f"from {background.bottom} below to {background.top} above")
 
 
-def _colour(found: Examination) -> Iterator[Finding]:
+def colour(found: Examination) -> Iterator[Finding]:
     if not found.measures.scene.is_grey:
         yield Finding(True, "a colour of the scene is not grey")
     else:
         yield Finding(False, "every colour of the scene is grey: one channel")
-
-
-FINDERS: Final[dict[str, Finder]] = {
-    "off_axis": _off_axis,
-    "front_test": _front_test,
-    "diffuse": lighting.diffuse_terms,
-    "specular": lighting.specular_terms,
-    "specular_gate": lighting.gates,
-    "self_shadow": _self_shadow,
-    "behind_eye": _behind_eye,
-    "in_view": _in_view,
-    "hidden": _hidden,
-    "order": _order,
-    "plane": _plane,
-    "checker": _checker,
-    "lights": lighting.lights,
-    "shadow": lighting.shadows,
-    "plane_shadow": lighting.plane_shadows,
-    "mirror": mirroring.mirrors,
-    "mirror_depth": mirroring.depths,
-    "attenuation": _attenuation,
-    "directional": _directional,
-    "gradient": _gradient,
-    "colour": _colour,
-    "clip": lighting.clipping,
-}

@@ -118,13 +118,11 @@ class Plan:
 
         At most 10,000; a last one says how many more there are. Raises KeyError for an unknown effect.
         """
-        from symrender_cg.plan.findings import FINDERS
-        from symrender_cg.plan.summary import summarise
-
-        found = tuple(islice(FINDERS[effect(name).name](self.examination), MOST_FINDINGS + 1))
+        entry = effect(name)
+        found = tuple(islice(entry.find(self.examination), MOST_FINDINGS + 1))
         if len(found) <= MOST_FINDINGS:
             return found
-        left = summarise(name, self.examination).subjects - MOST_FINDINGS
+        left = entry.tally(self.examination).subjects - MOST_FINDINGS
         return (*found[:MOST_FINDINGS], Finding(True, f"and {left} more, not written out"))
 
     def needs(self, effect: str) -> bool:
@@ -171,23 +169,18 @@ class Plan:
                 entry, True, f"forced in; left out otherwise, for {finding.reason}", finding.margin, finding.bound
             )
         if self.scene is not self.given and entry.name in ("diffuse", "specular"):
-            from symrender_cg.plan.summary import summarise
-
-            tally = summarise(entry.name, self.examination)
+            tally = entry.tally(self.examination)
             return Decision(entry, finding.needed, tally.reason, None, tally.bound)
         return Decision(entry, finding.needed, finding.reason, finding.margin)
 
     def _of_scene(self, entry: Effect, found: Examination) -> Decision:
-        from symrender_cg.plan.findings import FINDERS
-        from symrender_cg.plan.summary import summarise
-
-        tally = summarise(entry.name, found)
+        tally = entry.tally(found)
         needed, reason = tally.needed, tally.reason
         if entry.name in self.force and entry.optional:
             needed, reason = True, f"forced in everywhere; {reason}"
         margin = None
         if tally.subjects <= MOST_SUMMARISED:
-            margins = [f.margin for f in FINDERS[entry.name](found) if f.status == "absent" and f.margin is not None]
+            margins = [f.margin for f in entry.find(found) if f.status == "absent" and f.margin is not None]
             margin = min(margins, default=None)
         return Decision(entry, needed, reason, margin, tally.bound)
 

@@ -5,9 +5,7 @@ Comes in: an Examination. Goes out: Tally. Never done here: a decision about one
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -28,11 +26,6 @@ class Tally:
     bound: float | None = None
 
 
-def summarise(name: str, found: Examination) -> Tally:
-    """The tally of the effect of that name."""
-    return TALLIES[name](found)
-
-
 def _many(count: int, what: str) -> str:
     """`1 sphere`, `3 spheres`."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
@@ -44,18 +37,18 @@ def _left_out(some: int, of: int, where: str) -> Tally:
     return Tally(False, f"{some} of {_many(of, 'sphere')} {where}", of)
 
 
-def _behind_eye(found: Examination) -> Tally:
+def behind_eye_tally(found: Examination) -> Tally:
     return _left_out(int(found.views.behind.sum()), found.measures.count, "wholly behind the plane of the eye")
 
 
-def _in_view(found: Examination) -> Tally:
+def in_view_tally(found: Examination) -> Tally:
     count = found.measures.count
     if found.views.aspect is None:
         return Tally(False, "no window: any point of the image plane may be asked for", count)
     return _left_out(int(found.views.outside.sum()), count, f"outside the window of aspect {found.views.aspect:.6g}")
 
 
-def _hidden(found: Examination) -> Tally:
+def hidden_tally(found: Examination) -> Tally:
     views = found.views
     kinds = ((views.beyond, "beyond the plane"), (views.contained, "inside another"), (views.hidden, "behind another"))
     told = ", ".join(f"{int(some.sum())} {where}" for some, where in kinds if some.any())
@@ -63,7 +56,7 @@ def _hidden(found: Examination) -> Tally:
     return _left_out(total, found.measures.count, f"wholly hidden{f': {told}' if told else ''}")
 
 
-def _order(found: Examination) -> Tally:
+def order_tally(found: Examination) -> Tally:
     visible = found.views.visible
     i, j, _ = found.views.touching
     cut, count = int((visible[i] & visible[j]).sum()), int(visible.sum())
@@ -76,12 +69,12 @@ def _order(found: Examination) -> Tally:
     return Tally(False, text, pairs)
 
 
-def _off_axis(found: Examination) -> Tally:
+def off_axis_tally(found: Examination) -> Tally:
     del found
     return Tally(True, "the kernel of a scene takes spheres anywhere", 1)
 
 
-def _front_test(found: Examination) -> Tally:
+def front_test_tally(found: Examination) -> Tally:
     seen = at_eye(found.measures)[found.views.visible]
     near, count = int(seen.sum()), len(seen)
     if near:
@@ -89,12 +82,12 @@ def _front_test(found: Examination) -> Tally:
     return Tally(False, f"{_many(count, 'visible sphere')} wholly before the eye", count)
 
 
-def _self_shadow(found: Examination) -> Tally:
+def self_shadow_tally(found: Examination) -> Tally:
     text = "a sphere is convex: where n.l > 0 the way to the light leaves it; where not, diffuse is 0"
     return Tally(False, text, int(found.matters[: found.measures.count].sum()))
 
 
-def _plane(found: Examination) -> Tally:
+def plane_tally(found: Examination) -> Tally:
     if found.measures.plane is None:
         return Tally(False, "the scene has no plane", 1)
     if found.views.plane_seen:
@@ -104,7 +97,7 @@ def _plane(found: Examination) -> Tally:
     return Tally(False, "above the horizon at every corner of the window, and no mirror shows it", 1)
 
 
-def _checker(found: Examination) -> Tally:
+def checker_tally(found: Examination) -> Tally:
     plane = found.measures.plane
     if plane is None or plane.checker is None:
         return Tally(False, "the scene has no plane" if plane is None else "the plane has one material", 1)
@@ -126,15 +119,15 @@ def _terms(found: Examination, name: str, what: str) -> Tally:
     return Tally(kept > 0, text, pairs, bound)
 
 
-def _diffuse(found: Examination) -> Tally:
+def diffuse_tally(found: Examination) -> Tally:
     return _terms(found, "diffuse", "a diffuse term")
 
 
-def _specular(found: Examination) -> Tally:
+def specular_tally(found: Examination) -> Tally:
     return _terms(found, "specular", "a specular term")
 
 
-def _specular_gate(found: Examination) -> Tally:
+def specular_gate_tally(found: Examination) -> Tally:
     gated, total = int(found.lamps.gated.sum()), int(found.lamps.specular.sum())
     if gated:
         return Tally(True, f"{gated} of {_many(total, 'highlight')} gated by n.l > 0", int(found.matters.sum()))
@@ -142,7 +135,7 @@ def _specular_gate(found: Examination) -> Tally:
     return Tally(False, text, int(found.matters.sum()))
 
 
-def _lights(found: Examination) -> Tally:
+def lights_tally(found: Examination) -> Tally:
     pairs = int(found.matters.sum()) * len(found.measures.at)
     lit, cut = int(found.lamps.any.sum()), int((found.lamps_before.any & ~found.lamps.any).sum())
     text = f"{lit} of {_many(pairs, 'pair')} of a surface and a light"
@@ -152,7 +145,7 @@ def _lights(found: Examination) -> Tally:
     return Tally(lit > 0, f"{text}; {cut} left out for at most {bound:.6g}", pairs, bound)
 
 
-def _shadow(found: Examination) -> Tally:
+def shadow_tally(found: Examination) -> Tally:
     if not found.measures.scene.shadows:
         return Tally(False, "the scene asks for no shadows", 1)
     lamps = found.lamps.any
@@ -162,7 +155,7 @@ def _shadow(found: Examination) -> Tally:
     return Tally(kept > 0, f"{kept} of {_many(pairs, 'pair')} of a sphere and a lit surface", pairs)
 
 
-def _plane_shadow(found: Examination) -> Tally:
+def plane_shadow_tally(found: Examination) -> Tally:
     if found.measures.plane is None:
         return Tally(False, "the scene has no plane", 1)
     count, dark = len(found.measures.at), int(found.measures.separated.sum())
@@ -172,7 +165,7 @@ def _plane_shadow(found: Examination) -> Tally:
     return Tally(False, text, count)
 
 
-def _mirror(found: Examination) -> Tally:
+def mirror_tally(found: Examination) -> Tally:
     mirrors, count = found.mirrors, found.measures.count
     if not mirrors.bounces:
         bound = None if found.budget is None or not found.budget.depth_bound else found.budget.depth_bound
@@ -184,7 +177,7 @@ def _mirror(found: Examination) -> Tally:
     return Tally(True, text, pairs + int(mirrors.plane.sum()) + int((found.matters & ~mirrors.mirror).sum()))
 
 
-def _mirror_depth(found: Examination) -> Tally:
+def mirror_depth_tally(found: Examination) -> Tally:
     limit, bounces, budget = found.measures.scene.max_bounces, found.mirrors.bounces, found.budget
     bound = None if budget is None or not budget.depth_bound else budget.depth_bound
     text = f"{bounces} of {_many(limit, 'bounce')}"
@@ -195,7 +188,7 @@ def _mirror_depth(found: Examination) -> Tally:
     return Tally(bounces > 1, text, max(limit, 1), bound)
 
 
-def _attenuation(found: Examination) -> Tally:
+def attenuation_tally(found: Examination) -> Tally:
     lights = found.measures.scene.lights
     used = np.any(found.lamps.any, axis=0)
     fading = sum(1 for light, lit in zip(lights, used, strict=True) if lit and fades(light))
@@ -206,13 +199,13 @@ def _attenuation(found: Examination) -> Tally:
     return Tally(False, "every light that lights anything is as strong at every distance", len(lights))
 
 
-def _directional(found: Examination) -> Tally:
+def directional_tally(found: Examination) -> Tally:
     lights = found.measures.scene.lights
     some = sum(isinstance(light, DirectionalLight) for light in lights)
     return Tally(some > 0, f"{some} of {_many(len(lights), 'light')} from a direction", len(lights))
 
 
-def _gradient(found: Examination) -> Tally:
+def gradient_tally(found: Examination) -> Tally:
     background = found.measures.scene.background
     if not isinstance(background, Gradient):
         return Tally(False, f"the background is {background} in every direction", 1)
@@ -221,41 +214,15 @@ def _gradient(found: Examination) -> Tally:
     return Tally(True, f"from {background.bottom} below to {background.top} above", 1)
 
 
-def _colour(found: Examination) -> Tally:
+def colour_tally(found: Examination) -> Tally:
     if not found.measures.scene.is_grey:
         return Tally(True, "a colour of the scene is not grey", 1)
     return Tally(False, "every colour of the scene is grey: one channel", 1)
 
 
-def _clip(found: Examination) -> Tally:
+def clip_tally(found: Examination) -> Tally:
     bright = brightness(found.measures, found.mirrors, found.lamps_before)
     own = np.where(found.matters, bright.receiver, 0.0)
     top = max(float(own.max(initial=0.0)), bright.background) * bright.passed_on(found.mirrors.bounces)
     relation = "<=" if top <= 1.0 else ">"
     return Tally(top > 1.0, f"values up to {top:.6g} {relation} 1", int(found.matters.sum()) + 1)
-
-
-TALLIES: Final[dict[str, Callable[[Examination], Tally]]] = {
-    "off_axis": _off_axis,
-    "front_test": _front_test,
-    "diffuse": _diffuse,
-    "specular": _specular,
-    "specular_gate": _specular_gate,
-    "self_shadow": _self_shadow,
-    "behind_eye": _behind_eye,
-    "in_view": _in_view,
-    "hidden": _hidden,
-    "order": _order,
-    "plane": _plane,
-    "checker": _checker,
-    "lights": _lights,
-    "shadow": _shadow,
-    "plane_shadow": _plane_shadow,
-    "mirror": _mirror,
-    "mirror_depth": _mirror_depth,
-    "attenuation": _attenuation,
-    "directional": _directional,
-    "gradient": _gradient,
-    "colour": _colour,
-    "clip": _clip,
-}
