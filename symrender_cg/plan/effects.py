@@ -53,8 +53,8 @@ class Effect:
     """One effect: what it is, what leaving it out removes from the kernel, and the condition under which it is absent.
 
     `examine` is that of SPHERE_EFFECTS. `find` gives the finding of each subject, `tally` sums them up. `optional`
-    effects may be forced in; the others are facts of the geometry that no kernel has a use for, or what the shape of the
-    image asks for.
+    effects may be forced in; the others are facts of the geometry that no kernel has a use for, or what the shape of
+    the image asks for.
     """
 
     name: str
