@@ -183,7 +183,9 @@ def picture(
     mi, dr = loaded.mi, loaded.dr
     ambient, diffuse, specular = (mi.Float(c) for c in (material.ambient, material.diffuse, material.specular))
     shininess, intensity = mi.Float(material.shininess), mi.Float(light.intensity)
-    position = mi.Point3f(*loaded.frame.lights[0].position)  # type: ignore[union-attr]
+    lamp = loaded.frame.lights[0]
+    assert isinstance(lamp, PointLight), "_plain refuses every other light"
+    position = mi.Point3f(*lamp.position)
     dr.make_opaque(ambient, diffuse, specular, shininess, intensity, position)
     radii = mi.Float(np.array([s.radius for s in scene.spheres], dtype=np.float32))
 

@@ -23,6 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -241,7 +242,8 @@ def grid(frame: Scene, width: int, height: int) -> tuple[Floats, Floats]:
     step = np.float64(pixel_size(frame, height))
     columns = (np.arange(width, dtype=np.float64) + 0.5 - 0.5 * width) * step
     rows = (0.5 * height - 0.5 - np.arange(height, dtype=np.float64)) * step
-    return np.broadcast_arrays(columns[np.newaxis, :], rows[:, np.newaxis])  # type: ignore[return-value]
+    x, y = np.broadcast_arrays(columns[np.newaxis, :], rows[:, np.newaxis])
+    return x, y
 
 
 def errors(values: Any, true: Any, where: Any) -> float:
@@ -318,7 +320,7 @@ class Report:
             ("terms against the image: largest difference", "terms"),
             ("single: largest error", "error_single"),
         ):
-            worst = sorted(self.scenes, key=lambda scene, name=name: -getattr(scene, name))[:LISTED]  # type: ignore[misc]
+            worst = sorted(self.scenes, key=attrgetter(name), reverse=True)[:LISTED]
             told = ", ".join(f"{getattr(scene, name):.1e} ({scene.seed})" for scene in worst[:4])
             lines.append(f"{title} (scene): {told}")
         wrong, sure = (sum(getattr(scene, name) for scene in self.scenes) for name in ("wrong", "sure"))

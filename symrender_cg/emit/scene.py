@@ -342,8 +342,8 @@ class _Loops:
             found["gradient_lines"] = body(self.programs["gradient"].steps, {})
         if need.plane:
             plane = PrimaryBodies(self.programs["plane"], ())
-            found["ground_lines"] = plane.pixel(("descent", *(("p_x", "p_y", "p_z") if need.checker else ())))
-            found["void_ground"] = _void(found["ground_lines"], ["r", "f"])  # type: ignore[arg-type]
+            ground = plane.pixel(("descent", *(("p_x", "p_y", "p_z") if need.checker else ())))
+            found |= {"ground_lines": ground, "void_ground": _void(ground, ["r", "f"])}
         if need.mirrors:
             found |= self._loop("echo", "echo", ("disc", "ahead", "t"))
             found |= self._loop("arrival", "arrival")
