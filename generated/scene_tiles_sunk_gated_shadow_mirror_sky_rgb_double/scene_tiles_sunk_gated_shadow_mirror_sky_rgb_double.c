@@ -820,7 +820,7 @@ static void find_in_mirror(points *p, const run *q, int k, const scene_type *sce
     }
 }
 
-/* Normal and next mirrored ray where rays of the points above meet sphere k: of points from..to, in a new run. */
+/* Normal and next mirrored ray of a new run: where the rays of the points that it is seen in meet its sphere. */
 static void arrive(points *child, const run *q, const points *p, int of, const scene_type *scene)
 {
     const int k = q->receiver;
