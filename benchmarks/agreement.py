@@ -31,7 +31,7 @@ from benchmarks.scaling import warm_sample
 from benchmarks.strips import save_strip
 from symrender_cg import Scene, render_image, render_layers
 from symrender_cg.errors import OutsidePlanError
-from symrender_cg.reference import brute_force, scene_oracle
+from symrender_cg.reference import brute_force, oracle
 from symrender_cg.scene import Phong, PointLight, load_scene
 
 Floats = NDArray[np.float64]
@@ -291,7 +291,7 @@ class _One:
         off = np.flatnonzero(~at_edge)[:: max(1, int((~at_edge).sum()) // ASKED)][:ASKED]
         right = 0
         if off.size:
-            truth = self._channels(scene_oracle.evaluate(self.frame, *self._points(rows[off], columns[off])).value)
+            truth = self._channels(oracle.evaluate(self.frame, *self._points(rows[off], columns[off])).value)
             good, bad = (np.abs(v[off] - truth).max(axis=-1) <= LEVEL for v in (ours, theirs))
             right = int((good & ~bad).sum())
         if self.out is not None:

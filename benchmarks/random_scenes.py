@@ -5,7 +5,7 @@ decisions are in doubt, what changed where something left out was put back, dist
 test suite, by number, so that each finding is one: `random_scene(seed)`.
 
     image       the kernel of the scene's own plan, float64, against brute_force (numpy, no plan) where its doubt allows
-    index       the same kernel's layer against scene_oracle (exact), at every pixel
+    index       the same kernel's layer against oracle (exact), at every pixel
     text        the same scene drawn by the kernel with every effect in its text: what was left out of the C
     forced      that kernel again, with one effect after another forced into the plan: what was left out of the lists
     points      that kernel's other entry point, at the pixel centres, under the plan that knows no window
@@ -43,7 +43,7 @@ from symrender_cg.lower.variants import variant
 from symrender_cg.pipeline import pixel_size, planned
 from symrender_cg.plan.effects import EFFECTS, SCENE
 from symrender_cg.plan.plan import Plan, require_format
-from symrender_cg.reference import brute_force, scene_oracle
+from symrender_cg.reference import brute_force, oracle
 from symrender_cg.run.render import render_layers
 from symrender_cg.run.scene_kernel import LAYERS, SceneKernel, layer_arrays
 from symrender_cg.run.scene_numbers import scene_numbers
@@ -191,7 +191,7 @@ def compare(scene: Scene, seed: int, width: int, height: int, root: Path, *, own
     every = every_effect("double", root)
     drawn = render_layers(scene, width, height, cache=root) if own else every.layers(found, width, height)
     x, y = grid(found.scene, width, height)
-    true = scene_oracle.index(scene, x, y)
+    true = oracle.index(scene, x, y)
     clear = traced.doubt > DOUBT["double"]
     wrong = drawn["index"] != true
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from symrender_cg.pipeline import compile_kernel, statistics, translate
-    from symrender_cg.run.render import evaluate, render_image, render_layers
+    from symrender_cg.run.certify import Certificate, Certified
+    from symrender_cg.run.render import certify, evaluate, render_image, render_layers
     from symrender_cg.scene import (
         Camera,
         DirectionalLight,
@@ -52,6 +53,9 @@ _HOME = {
     "compile_kernel": "pipeline",
     "statistics": "pipeline",
     "translate": "pipeline",
+    "Certificate": "run.certify",
+    "Certified": "run.certify",
+    "certify": "run.render",
     "evaluate": "run.render",
     "render_image": "run.render",
     "render_layers": "run.render",
@@ -70,6 +74,8 @@ __all__ = [
     "AccuracyError",
     "ArgumentError",
     "Camera",
+    "Certificate",
+    "Certified",
     "CompileError",
     "CompilerNotFoundError",
     "DirectionalLight",
@@ -85,6 +91,7 @@ __all__ = [
     "SymrenderError",
     "ToolchainError",
     "__version__",
+    "certify",
     "compile_kernel",
     "evaluate",
     "load_scene",

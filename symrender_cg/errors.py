@@ -52,9 +52,16 @@ class OutsidePlanError(SymrenderError, ValueError):
 
 
 class AccuracyError(SymrenderError):
-    """A stated bound that a measurement broke."""
+    """A stated bound or certificate that is not met; `points`: indices of the points that it is about, if any."""
 
     exit_code = 4
+
+    def __init__(self, message: str, points: Sequence[int] = ()) -> None:
+        self.points = tuple(points)
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[type[AccuracyError], tuple[str, tuple[int, ...]]]:
+        return type(self), (str(self), self.points)
 
 
 class ToolchainError(SymrenderError, RuntimeError):

@@ -24,11 +24,13 @@ from symrender_cg.version import VERSION
 if TYPE_CHECKING:
     from symrender_cg.pipeline import Translation
 
-LAYOUT: Final = 2
+LAYOUT: Final = 3
 """Counts the changes of what is written here, so that what an older version kept is not taken for up to date."""
 
 SUPPORT: Final = "support"
 MANIFEST: Final = "manifest.json"
+ENCLOSES: Final = "hi, lo and error, |true intensity - (hi + lo)| <= error, at every point; inf where nothing is known"
+"""What the enclosure of a scene promises, whichever level rests on it."""
 _STANDS_IN_COMMENTS: Final = re.compile(r"[\w.+@=/, -]{1,60}", re.ASCII)
 
 Status = Literal["new", "updated", "unchanged"]
@@ -61,17 +63,20 @@ def places(kernel: str, texts: Mapping[str, str], manifest: str) -> dict[str, st
 def manifest_text(translation: Translation, *, command: str, numbers: Mapping[str, float] | None = None) -> str:
     """manifest.json of a kernel: what it is, what its plan rests on, its inputs, its cost, how to remake it.
 
+    The enclosure of a scene has the accuracy `enclosure`: it is the same for every level that rests on it.
+
     Of the kernel of a scene also its parts, each with its operations by rate, and the shapes of its structure's fields.
     """
     emitted, variant = translation.emitted, translation.variant
     own = [name for name in emitted.files if Path(name).stem == emitted.name]
+    encloses = variant.settles is not None and translation.plan.arrangement is not None
     manifest = {
         "layout": LAYOUT,
         "name": emitted.name,
         "made_by": f"symrender_cg {VERSION}",
         "command": command,
-        "accuracy": variant.name,
-        "promise": variant.promise,
+        "accuracy": "enclosure" if encloses else variant.name,
+        "promise": ENCLOSES if encloses else variant.promise,
         "plan": [
             {
                 "effect": decision.effect.name,
@@ -133,7 +138,7 @@ def write(files: Mapping[str, str], folder: Path) -> tuple[Outcome, ...]:
     return found
 
 
-def regenerate_command(scene: str | None, accuracy: str, *, bake: bool = False) -> str:
+def regenerate_command(scene: str | None, accuracy: str, *, target: str | None = None, bake: bool = False) -> str:
     """The command line that makes a kernel again; it stands in C comments.
 
     The scene is named as the user did: a built-in name, or a path relative to where they are. Of a path that is
@@ -142,7 +147,9 @@ def regenerate_command(scene: str | None, accuracy: str, *, bake: bool = False) 
     named = "chapter1" if scene is None else scene
     candidates = (named, Path(named).name, "SCENE")
     chosen = next(c for c in candidates if _STANDS_IN_COMMENTS.fullmatch(c) and not Path(c).is_absolute())
-    words = ["python", "-m", "symrender_cg", "build", chosen, "--accuracy", accuracy, *(("--bake",) if bake else ())]
+    words = ["python", "-m", "symrender_cg", "build", chosen, "--accuracy", accuracy]
+    words += ["--target", target] if target is not None else []
+    words += ["--bake"] if bake else []
     return shlex.join(words)
 
 

@@ -9,6 +9,9 @@ file. Never done here: rendering, a format guessed from anything but the name, a
     .npy   the array itself, in its own format
     .npz   several arrays by name, the image under `image`, not compressed
     .pfm   float32, little endian, rows from bottom to top; linear intensity
+
+Grey levels that are rounded already (uint8, level / 255 is the intensity) are written as they are: to a linear .png of
+8 bits, a .npy or a .npz.
 """
 
 from __future__ import annotations
@@ -58,10 +61,14 @@ class ImageFormat:
         return f"{held}, {kind}, linear" if self.colour else f"{held}, linear"
 
 
-def image_format(path: str | Path, *, bits: int | None = None, encoding: str | None = None) -> ImageFormat:
+def image_format(
+    path: str | Path, *, bits: int | None = None, encoding: str | None = None, levels: bool = False
+) -> ImageFormat:
     """The format that a file's name asks for; PNG is 8 bit sRGB unless told otherwise.
 
-    Raises ArgumentError for another extension, unknown bits or encoding, and for either where the format has none.
+    levels: what is written is uint8 grey levels, not intensities; a PNG of them is 8 bit linear.
+    Raises ArgumentError for another extension, unknown bits or encoding, and for either where the format has none, or
+    where it would round grey levels again.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
@@ -75,8 +82,18 @@ def image_format(path: str | Path, *, bits: int | None = None, encoding: str | N
                     f"{name}: {given} has no meaning for {suffix}, which holds the linear intensities as numbers; "
                     "leave it out, or write a .png"
                 )
+        if levels and suffix == ".pfm":
+            raise ArgumentError(f"{path}: a .pfm holds floats, not grey levels of 0 to 255; write a .png, .npy or .npz")
         return ImageFormat(suffix)
-    chosen = ImageFormat(suffix, 8 if bits is None else bits, "srgb" if encoding is None else encoding)
+    if levels and encoding == "srgb":
+        raise ArgumentError(
+            "encoding: 'srgb' would round grey levels a second time, which are proportional to intensity and right as "
+            "they are; leave it out, or ask for intensities (another target) to be encoded"
+        )
+    if levels and bits == 16:
+        raise ArgumentError("bits: 16 has no meaning for grey levels of 0 to 255; leave it out, or ask for intensities")
+    usual = "linear" if levels else "srgb"
+    chosen = ImageFormat(suffix, 8 if bits is None else bits, usual if encoding is None else encoding)
     if chosen.bits not in BITS:
         raise ArgumentError(f"bits: {bits!r} is not offered; expected 8 or 16")
     if chosen.encoding not in ENCODINGS:
@@ -89,20 +106,23 @@ def write_image(
 ) -> ImageFormat:
     """Writes intensities (height, width) or (height, width, 3) to a file in the format of its name, which is returned.
 
+    Values of dtype uint8 are grey levels of 0 to 255 and are written as they are.
     Raises ArgumentError for what image_format refuses, an array of another kind, intensities that are not finite in a
     .png, and a place that cannot be written. Whatever happens, the path holds the old file or the whole new one.
     """
-    chosen = image_format(path, bits=bits, encoding=encoding)
-    if values.shape[2:] not in ((), (3,)) or values.ndim < 2 or values.dtype.kind != "f" or values.size == 0:
+    levels = values.dtype == np.uint8
+    chosen = image_format(path, bits=bits, encoding=encoding, levels=levels)
+    real = levels or values.dtype.kind == "f"
+    if values.shape[2:] not in ((), (3,)) or values.ndim < 2 or not real or values.size == 0:
         raise ArgumentError(
             f"values: dtype {values.dtype} and shape {values.shape}; expected floating-point intensities of shape "
             "(height, width) or (height, width, 3), at least one pixel"
         )
     chosen = replace(chosen, colour=values.ndim == 3)
     if chosen.suffix == ".png":
-        levels = quantise(values, chosen)
+        grey = values if levels else quantise(values, chosen)
         with replacing(path) as file:
-            _write_png(file, levels, chosen)
+            _write_png(file, grey, chosen)
     elif chosen.suffix == ".npz":
         write_arrays(path, {"image": values})
     else:

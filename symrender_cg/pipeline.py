@@ -24,7 +24,7 @@ import math
 import threading
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache as once
 from functools import lru_cache
 from pathlib import Path
@@ -39,9 +39,12 @@ from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.plan.plan import Plan, plan, require_format
 from symrender_cg.resources import templates
 from symrender_cg.run.drawing import Drawing, bind
+from symrender_cg.run.enclosure_kernel import EnclosureKernel
+from symrender_cg.run.enclosure_numbers import brought_nearer
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.run.scene_kernel import SceneKernel
+from symrender_cg.run.settling_kernel import SettlingKernel
 from symrender_cg.scene import Scene
 from symrender_cg.version import VERSION
 
@@ -92,7 +95,10 @@ class SphereTranslation:
 
 @dataclass(frozen=True)
 class SceneTranslation:
-    """The C text of the kernel of a scene and how it came about: its parts, derived and lowered."""
+    """The C text of the kernel of a scene and how it came about: its parts, derived and lowered.
+
+    Of a level that proves its values this is the enclosure of the scene: one text for all such levels.
+    """
 
     plan: Plan
     variant: Variant
@@ -101,8 +107,16 @@ class SceneTranslation:
     parts: dict[str, Part]
     programs: dict[str, KernelProgram]
 
+    @property
+    def encloses(self) -> bool:
+        """Whether the kernel gives enclosures (hi, lo, error), not values."""
+        return self.variant.settles is not None
+
 
 Translation = SphereTranslation | SceneTranslation
+
+ENCLOSURE = "enclosure"
+"""Stands in recipes and manifests in place of a level: several levels rest on it."""
 
 _kernels: dict[tuple[Any, ...], Kernel | SceneKernel] = {}
 _locks: dict[tuple[Any, ...], threading.Lock] = {}
@@ -120,7 +134,7 @@ def compile_kernel(
 ) -> Kernel | SceneKernel:
     """The kernel for a scene, at any point of the image plane: from memory, from the cache on disk, or compiled now."""
     found = planned(scene, force=tuple(force))
-    return _compiled(found, accuracy, bake=bake, portable=portable, cache=cache)
+    return _compiled(found, variant(accuracy), bake=bake, portable=portable, cache=cache)
 
 
 def draw(
@@ -135,10 +149,18 @@ def draw(
     max_error: float = 0.0,
     cache: str | Path | None = None,
 ) -> Drawing:
-    """A scene bound to its kernel: for an image of `size` (width, height) pixels, or for points where it is None."""
+    """A scene bound to its kernel: for an image of `size` (width, height) pixels, or for points where it is None.
+
+    Raises ArgumentError for a level that several stages prove: no kernel draws it alone.
+    """
+    if variant(accuracy).settles:
+        raise ArgumentError(
+            f"accuracy: {accuracy!r} is proved value by value, in stages; expected a level that one kernel draws "
+            "alone: 'fast', 'single', 'literal' or 'double'"
+        )
     aspect = None if size is None else size[0] / size[1]
     found = planned(scene, force=tuple(force), aspect=aspect, max_error=max_error)
-    kernel = _compiled(found, accuracy, bake=bake, portable=portable, cache=cache)
+    kernel = _compiled(found, variant(accuracy), bake=bake, portable=portable, cache=cache)
     white = 1.0 if clip else math.inf
     if size is None:
         return bind(kernel, found, white=white)
@@ -177,6 +199,7 @@ def translate(
     scene: Scene,
     accuracy: str = "double",
     *,
+    target: str | None = None,
     bake: bool = False,
     force: Iterable[str] = (),
     aspect: float | None = None,
@@ -184,11 +207,16 @@ def translate(
     name: str | None = None,
     command: str | None = None,
 ) -> Translation:
-    """Plan, derive, lower and emit: the C text of a scene's kernel, without compiling it."""
+    """Plan, derive, lower and emit: the C text of a scene's kernel, without compiling it.
+
+    Of `stable` and `certified` that is the kernel that bounds its own error, where there is one sphere under one light,
+    and else the enclosure; `target` is what `certified` rounds to.
+    """
+    chosen = variant(accuracy, target)
     start = time.perf_counter()
     found = plan(scene, force=force, aspect=aspect, max_error=max_error)
     seconds = {"plan": time.perf_counter() - start}
-    return _translated(found, variant(accuracy), seconds, bake=bake, name=name, command=command)
+    return _translated(found, chosen, seconds, bake=bake, name=name, command=command)
 
 
 def _translated(
@@ -201,7 +229,10 @@ def _translated(
     command: str | None = None,
 ) -> Translation:
     require_kind(found, chosen, bake=bake)
-    told = command or f"python -m symrender_cg build SCENE --accuracy {chosen.name}"
+    if chosen.settles and found.arrangement is not None:
+        return translate_enclosure(found, chosen, seconds, name=name, command=command)
+    level, _, target = chosen.name.partition("_")
+    told = command or f"python -m symrender_cg build SCENE --accuracy {level}{f' --target {target}' if target else ''}"
     statistics.add("derived")
     if found.arrangement is None:
         return _translated_sphere(found, chosen, seconds, bake=bake, name=name, command=told)
@@ -210,6 +241,8 @@ def _translated(
 
 def require_kind(found: Plan, chosen: Variant, *, bake: bool) -> None:
     """Raises where there is no such kernel of scenes: baked, or by the formula of the seed, which has one sphere."""
+    if bake and chosen.settles:
+        raise ArgumentError(f"bake: a kernel of {chosen.name!r} takes its numbers as arguments; leave bake out")
     if found.arrangement is None:
         return
     if bake:
@@ -277,6 +310,93 @@ def _translated_scene(
     return SceneTranslation(found, chosen, emitted, seconds, parts, programs)
 
 
+def settling_kernel(
+    scene: Scene,
+    chosen: Variant,
+    *,
+    aspect: float | None = None,
+    portable: bool = False,
+    cache: str | Path | None = None,
+) -> tuple[SettlingKernel, Scene] | None:
+    """The kernel that bounds its own error, and the scene that it draws; None where a scene has more than one sphere
+    under one light: then the enclosure is the first stage."""
+    found = planned(scene, aspect=aspect)
+    if found.arrangement is not None:
+        return None
+    kernel = _compiled(found, chosen, bake=False, portable=portable, cache=cache)
+    assert isinstance(kernel, SettlingKernel), f"{chosen.name} settles"
+    return kernel, found.scene
+
+
+def enclosure_kernel(scene: Scene, *, portable: bool = False, cache: str | Path | None = None) -> EnclosureKernel:
+    """The kernel that encloses a scene's intensities at any points of the image plane, bound to the scene."""
+    found, nearer = planned(scene), None
+    if found.arrangement is None:
+        nearer = brought_nearer(found.scene)
+        found = planned(nearer or scene, force=("scene",))
+    root = Path(cache) if cache is not None else default_root()
+    key = (found.key, "enclosure", portable, root)
+    with _lock_of(key):
+        kernel = _enclosures.get(key)
+        if kernel is None:
+            kernel = _enclosures[key] = _enclosure(found, portable=portable, root=root)
+    return replace(kernel, plan=found, nearer=nearer is not None)
+
+
+_enclosures: dict[tuple[Any, ...], EnclosureKernel] = {}
+
+
+def translate_enclosure(
+    found: Plan,
+    chosen: Variant | None = None,
+    seconds: dict[str, float] | None = None,
+    *,
+    name: str | None = None,
+    command: str | None = None,
+) -> SceneTranslation:
+    """Derive, lower and emit: the C text of the enclosure of a planned scene, which has an arrangement.
+
+    The text is the same for every level that rests on it; `chosen` is the one that asks for it, certified by default.
+    """
+    from symrender_cg.emit.enclosure import emit_enclosure, enclosure_parts
+    from symrender_cg.emit.scene_fields import Needs
+    from symrender_cg.lower.enclose import enclose_part
+
+    statistics.add("derived")
+    spent = {} if seconds is None else seconds
+    start = time.perf_counter()
+    need = Needs.of(found.flags)
+    parts = enclosure_parts(need)
+    derived = time.perf_counter()
+    programs = {key: enclose_part(part) for key, part in parts.items()}
+    lowered = time.perf_counter()
+    told = command or "python -m symrender_cg build SCENE --accuracy certified"
+    emitted = emit_enclosure(programs, need=need, plan=found, command=told, name=name or enclosure_name(found))
+    spent |= {"derive": derived - start, "lower": lowered - derived, "emit": time.perf_counter() - lowered}
+    return SceneTranslation(found, chosen or variant("certified"), emitted, spent, parts, programs)
+
+
+def enclosure_name(found: Plan) -> str:
+    """The C name of a scene's enclosure."""
+    return f"{found.name}_enclosure"
+
+
+def _enclosure(found: Plan, *, portable: bool, root: Path) -> EnclosureKernel:
+    recipe = recipe_of(found, ENCLOSURE, (), portable)
+    store = Cache(root)
+    recalled = store.recall(recipe, portable=portable)
+    if recalled is not None:
+        cached, payload = recalled
+        statistics.add("recalled")
+    else:
+        translation = translate_enclosure(found)
+        cached = build_kernel(translation, portable=portable, root=root, recipe=recipe)
+        payload = _payload(translation)
+    fields = tuple((str(name), str(shape)) for name, shape in payload["fields"])
+    channels = 3 if "colour" in found.flags else 1
+    return EnclosureKernel(payload["name"], fields, channels, found, cached, store.load(cached))
+
+
 def build_kernel(
     translation: Translation, *, portable: bool = False, root: Path | None = None, recipe: str | None = None
 ) -> CachedKernel:
@@ -299,10 +419,14 @@ def recipe_of(scene_plan: Plan, accuracy: str, baked: Iterable[tuple[str, float]
 
 
 def _compiled(
-    found: Plan, accuracy: str, *, bake: bool, portable: bool, cache: str | Path | None
+    found: Plan, chosen: Variant, *, bake: bool, portable: bool, cache: str | Path | None
 ) -> Kernel | SceneKernel:
-    chosen = variant(accuracy)
     require_kind(found, chosen, bake=bake)
+    if chosen.settles and found.arrangement is not None:
+        raise OutsidePlanError(
+            f"accuracy: {chosen.name!r} has a kernel of its own for one sphere under one light; this scene has more, "
+            "and is drawn by its enclosure"
+        )
     require_format(found, chosen.shading)
     root = Path(cache) if cache is not None else default_root()
     baked = tuple(sorted(numbers_of(found.scene).items())) if bake else ()
@@ -333,12 +457,12 @@ def _kernel(
         cached = build_kernel(translation, portable=portable, root=root, recipe=recipe)
         payload = _payload(translation)
         log.debug("kernel %s compiled: %s", payload["name"], " ".join(cached.manifest.command))
-    dtype = np.dtype(np.float32 if payload["type"] == "float" else np.float64)
+    dtype = np.dtype({"float": "float32", "unsigned char": "uint8"}.get(payload["type"], "float64"))
     library = store.load(cached)
     if "fields" in payload:
         fields = tuple((str(name), str(shape)) for name, shape in payload["fields"])
         return SceneKernel(payload["name"], fields, int(payload["channels"]), dtype, cached, library)
-    return Kernel(
+    return (SettlingKernel if chosen.settles else Kernel)(
         name=payload["name"],
         inputs=tuple(payload["inputs"]),
         dtype=dtype,

@@ -32,7 +32,10 @@ THOROUGH = os.environ.get("SYMRENDER_THOROUGH", "") not in ("", "0")
 
 ACCURACIES = ("literal", "double", "single")
 EXACT = ("double", "single")
-"""The accuracy levels that promise the right hit or miss."""
+"""The accuracy levels whose one kernel promises the right hit or miss, of those in ACCURACIES."""
+
+PROVED = (("stable", None), ("certified", "float64"), ("certified", "float32"), ("certified", "uint8"))
+"""The accuracy levels that prove their values, each with what it rounds to."""
 
 MARKER = 7.0
 """A background that no shading of these tests reaches: a value is MARKER exactly where the evaluator saw a miss."""
@@ -60,6 +63,9 @@ EVALUATORS: tuple[Evaluator, ...] = (
     Evaluator("literal", lambda s, x, y: evaluate(s, x, y, accuracy="literal")),
     Evaluator("double", lambda s, x, y: evaluate(s, x, y, accuracy="double"), exact=True),
     Evaluator("single", lambda s, x, y: evaluate(s, x, y, accuracy="single"), np.float32, exact=True),
+    Evaluator("fast", lambda s, x, y: evaluate(s, x, y, accuracy="fast"), np.float32, exact=True),
+    Evaluator("stable", lambda s, x, y: evaluate(s, x, y, accuracy="stable"), exact=True),
+    Evaluator("certified", lambda s, x, y: evaluate(s, x, y, accuracy="certified"), exact=True),
     Evaluator("baked", lambda s, x, y: evaluate(s, x, y, accuracy="double", bake=True), exact=True),
 )
 

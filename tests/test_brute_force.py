@@ -15,7 +15,7 @@ from scene_strategies import random_scene, scaled, scene_points, scenes, turned
 from strategies import ordinary_scenes
 
 from symrender_cg.errors import ArgumentError
-from symrender_cg.reference import brute_force, scene_oracle
+from symrender_cg.reference import brute_force, oracle
 from symrender_cg.reference.brute_force import Traced
 from symrender_cg.reference.per_pixel import evaluate_per_pixel
 from symrender_cg.scene import Camera, DirectionalLight, Gradient, Phong, Plane, PointLight, Scene, Sphere
@@ -208,7 +208,7 @@ def test_a_small_sphere_a_million_radii_away_keeps_its_digits() -> None:
     )
     random = np.random.default_rng(0)
     x, y = ((0.3 + random.uniform(-2e-6, 2e-6, 60)) * 3.0, (-0.4 + random.uniform(-2e-6, 2e-6, 60)) * 3.0)
-    seen, truth = brute_force.trace(scene, x, y), scene_oracle.evaluate(scene, x, y)
+    seen, truth = brute_force.trace(scene, x, y), oracle.evaluate(scene, x, y)
     assert set(seen.index.tolist()) == {-1, 0, 1}
     assert (seen.doubt > SURE).all()
     np.testing.assert_array_equal(seen.index, truth.index)

@@ -13,7 +13,7 @@ from msgspec import structs
 
 from symrender_cg import Camera, Phong, PointLight, Scene, Sphere, evaluate, pipeline
 from symrender_cg.errors import AccuracyError
-from symrender_cg.reference import brute_force, check_scene, compare, oracle, points, scene_oracle
+from symrender_cg.reference import brute_force, check_scene, compare, oracle, points
 from symrender_cg.reference import check as module
 from symrender_cg.reference.check import check, stated_bound
 from symrender_cg.reference.check_rows import Report, Row
@@ -236,9 +236,7 @@ def test_the_numbers_of_a_scene_are_those_of_the_oracle() -> None:
     report = check(scene, width=6, height=4, count=50, seed=3, accuracies=("double",))
     frame = scene.in_camera_frame()
     (shadows,) = (p for p in check_scene.edge_points(frame, 1.5, 50, 3) if p.where == "near shadows")
-    errors = compare.measure(
-        evaluate(scene, shadows.x, shadows.y), scene_oracle.evaluate(scene, shadows.x, shadows.y).answers
-    )
+    errors = compare.measure(evaluate(scene, shadows.x, shadows.y), oracle.evaluate(scene, shadows.x, shadows.y))
     (row,) = (row for row in report.rows if row.accuracy and row.where == "near shadows")
     assert row.in_doubt == 0
     assert (row.max_ulp, row.max_abs, row.count) == (errors.max_ulp, errors.max_abs, 50)
@@ -297,7 +295,7 @@ def test_every_surface_is_told_from_every_other() -> None:
         x, y = check_scene._centres(frame, 40, 30)
         drawing = pipeline.draw(scene, size=size)
         found = check_scene.seen(drawing, check_scene._Points("", x, y, size), np.zeros(x.shape, dtype=np.int64))
-        assert np.array_equal(found, scene_oracle.index(scene, x, y))
+        assert np.array_equal(found, oracle.index(scene, x, y))
         assert len(np.unique(found)) > 2
 
 

@@ -23,15 +23,19 @@ ROOT = Path(__file__).resolve().parents[1]
 GENERATED = ROOT / "generated"
 README = GENERATED / "README.md"
 KERNELS = (
-    ("chapter1", "literal", False),
-    ("chapter1", "single", False),
-    ("chapter1", "double", False),
-    ("chapter1", "double", True),
-    ("off_axis", "double", False),
-    ("shadow", "double", False),
-    ("mirrors", "double", False),
+    ("chapter1", "literal", None, False),
+    ("chapter1", "fast", None, False),
+    ("chapter1", "single", None, False),
+    ("chapter1", "double", None, False),
+    ("chapter1", "double", None, True),
+    ("chapter1", "stable", None, False),
+    ("chapter1", "certified", "uint8", False),
+    ("off_axis", "double", None, False),
+    ("shadow", "double", None, False),
+    ("shadow", "certified", None, False),
+    ("mirrors", "double", None, False),
 )
-"""The kernels that are checked in: scene, accuracy, whether its numbers are baked in."""
+"""The kernels that are checked in: scene, accuracy, what it rounds to, whether its numbers are baked in."""
 
 UPDATE = "python -m pytest tests/test_golden.py --update"
 LONGEST_DIFF = 80
@@ -40,10 +44,10 @@ LONGEST_DIFF = 80
 def regenerated() -> dict[str, str]:
     """The texts of generated/ as the compiler writes them now, by their place in that folder."""
     texts: dict[str, str] = {}
-    for name, accuracy, bake in KERNELS:
+    for name, accuracy, target, bake in KERNELS:
         scene = load_scene(name)
-        command = generate.regenerate_command(name, accuracy, bake=bake)
-        translation = translate(scene, accuracy, bake=bake, command=command)
+        command = generate.regenerate_command(name, accuracy, target=target, bake=bake)
+        translation = translate(scene, accuracy, target=target, bake=bake, command=command)
         numbers = numbers_of(scene) if bake else None
         for place, text in generate.generate(translation, command=command, numbers=numbers).items():
             assert texts.setdefault(place, text) == text, f"two kernels disagree about {place}"
@@ -130,11 +134,11 @@ def test_the_same_bytes_are_written_whatever_the_hash_seed() -> None:
     assert difference(json.loads(first), checked_in()) == ""
 
 
-@pytest.mark.parametrize(("scene", "accuracy", "bake"), KERNELS)
+@pytest.mark.parametrize(("scene", "accuracy", "target", "bake"), KERNELS)
 def test_the_command_in_a_kernels_manifest_writes_that_kernel(
-    scene: str, accuracy: str, bake: bool, tmp_path: Path
+    scene: str, accuracy: str, target: str | None, bake: bool, tmp_path: Path
 ) -> None:
-    command = generate.regenerate_command(scene, accuracy, bake=bake)
+    command = generate.regenerate_command(scene, accuracy, target=target, bake=bake)
     (manifest,) = (entry for entry in manifests() if entry["command"] == command)
     words = shlex.split(command)
     assert words[:4] == ["python", "-m", "symrender_cg", "build"]

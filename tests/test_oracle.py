@@ -11,12 +11,12 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from flint import arb, ctx
+from flint import ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import image_points, nasty_scenes, scaled
 
-from symrender_cg.errors import ArgumentError, OutsidePlanError, SceneError
+from symrender_cg.errors import ArgumentError, SceneError
 from symrender_cg.reference import oracle, points
 from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere
 
@@ -90,6 +90,7 @@ def test_kept_answers_are_the_oracle_s_bit_for_bit(family: str) -> None:
         assert bool(answers.hit) == (case["status"] == "ok"), case["id"]
         assert float(answers.value).hex() == case["expect"], case["id"]
         assert float(answers.value32) == float.fromhex(case["f32"]), case["id"]
+        assert int(answers.value8) == case["u8"], case["id"]
         if case["id"] not in ROUGH_RESIDUALS:
             assert float(answers.residual) == float.fromhex(case["residual"]), case["id"]
         exact = Fraction(float(answers.value)) + Fraction(float(answers.residual))
@@ -190,12 +191,11 @@ def test_enclosures_contain_the_answer_and_hits_are_the_same(data: st.DataObject
     x, y = data.draw(image_points(scene))
     answers = oracle.evaluate(scene, x, y)
     assert answers.hit == oracle.hits(scene, x, y)
-    ball = oracle.enclosure(scene, x, y, 300)
-    with ctx.workprec(2400):
-        distance = ball - arb(float(answers.value)) - arb(float(answers.residual))
-        half_ulp = math.ulp(float(answers.residual)) if answers.residual else 2.0**-1074
-        assert distance.abs_lower() <= half_ulp
-        assert not ball.rad() > abs(ball).upper() * arb(2) ** -290
+    balls = oracle.enclose(scene, x, y, bits=300)
+    middle, radius = balls.middle.item(), balls.radius.item()
+    assert radius <= abs(middle) / 2**300
+    distance = abs(middle - Fraction(float(answers.value)) - Fraction(float(answers.residual)))
+    assert distance - radius <= Fraction(math.ulp(float(answers.residual)) if answers.residual else 2.0**-1074)
     assert abs(float(answers.residual)) <= 0.5 * math.ulp(float(answers.value))
 
 
@@ -286,10 +286,6 @@ def test_answers_have_the_broadcast_shape_and_misses_the_background() -> None:
 
 
 def test_scenes_and_points_that_have_no_answer_are_refused() -> None:
-    with pytest.raises(OutsidePlanError, match="lights: 2 of them; the references and the oracle take exactly one"):
-        oracle.evaluate(Scene(lights=(PointLight(), PointLight())), 0.0, 0.0)
-    with pytest.raises(OutsidePlanError, match="spheres: 0 of them"):
-        oracle.hits(Scene(spheres=(), camera=Camera(half_height=1.0)), 0.0, 0.0)
     with pytest.raises(ArgumentError, match="y: holds NaN or infinity"):
         oracle.evaluate(Scene(), 0.0, math.nan)
     with pytest.raises(ArgumentError, match="do not broadcast"):
@@ -301,6 +297,6 @@ def test_scenes_and_points_that_have_no_answer_are_refused() -> None:
 def test_the_precision_of_python_flint_is_left_as_it_was() -> None:
     before = ctx.prec
     oracle.evaluate(Scene(), 0.0, 0.0)
-    oracle.enclosure(Scene(), 0.0, 0.0, 500)
+    oracle.enclose(Scene(), 0.0, 0.0, bits=500)
     points.near_highlight(Scene(), 3, 0)
     assert ctx.prec == before

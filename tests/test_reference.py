@@ -413,7 +413,8 @@ def test_sets_of_curves_that_cannot_be_seen_are_empty() -> None:
 
 def answers_of(value: list[float], residual: list[float], hit: list[bool]) -> Answers:
     array = np.array(value)
-    return Answers(array, np.array(residual), np.array(hit), array.astype(np.float32))
+    levels = np.floor(255.0 * array.clip(0.0, 1.0) + 0.5).astype(np.uint8)
+    return Answers(array, np.array(residual), array.astype(np.float32), levels, np.array(hit, dtype=np.int64) - 1)
 
 
 def test_measure_counts_ulps_flips_and_values_that_are_not_finite() -> None:

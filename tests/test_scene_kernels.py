@@ -42,7 +42,7 @@ from symrender_cg.build import default_root
 from symrender_cg.pipeline import planned
 from symrender_cg.plan.effects import SCENE
 from symrender_cg.plan.plan import Plan
-from symrender_cg.reference import brute_force, scene_oracle
+from symrender_cg.reference import brute_force, oracle
 from symrender_cg.run.render import render_layers
 from symrender_cg.scene import Camera, Gradient, Phong, PointLight, Scene, Sphere
 
@@ -144,7 +144,7 @@ def test_a_scene_of_hypothesis_is_brute_force_s_with_and_without_an_effect_force
     drawn = every().layers(found, 10, 8)
     assert errors(drawn["image"], traced.value, clear) < BOUND
     assert errors(sum_of_terms(drawn), drawn["image"], np.ones(clear.shape, dtype=bool)) < 2e-15
-    np.testing.assert_array_equal(drawn["index"], scene_oracle.index(scene, *grid(found.scene, 10, 8)))
+    np.testing.assert_array_equal(drawn["index"], oracle.index(scene, *grid(found.scene, 10, 8)))
     forced = planned(scene, force=tuple(sorted({SCENE, effect})), aspect=1.25)
     change = largest_change(every().image(forced, 10, 8), drawn["image"])
     assert change == 0.0 or (effect in OTHER_FORM and change < BOUND)
@@ -349,7 +349,7 @@ def test_points_at_silhouettes_and_at_equal_depths_show_the_surface_that_the_ora
             continue
         kinds, x, y = np.array([kind for kind, _, _ in points]), *(np.array([p[k] for p in points]) for k in (1, 2))
         values = every(accuracy).points(found, x, y)
-        true, clear = scene_oracle.index(scene, x, y), brute_force.trace(scene, x, y).doubt > rounding
+        true, clear = oracle.index(scene, x, y), brute_force.trace(scene, x, y).doubt > rounding
         wrong = index_of(values[..., 0] if values.ndim == 2 else values) != true
         assert not (wrong & (clear | (kinds == "silhouette"))).any(), seed
         tried.update(kinds.tolist())
@@ -386,7 +386,7 @@ def test_pixels_at_silhouettes_show_the_surface_that_the_oracle_sees() -> None:
                     x, y = grid(found.scene, 8, 8)
                     for accuracy in ("double", "single"):
                         drawn = every(accuracy).layers(found, 8, 8)
-                        np.testing.assert_array_equal(drawn["index"], scene_oracle.index(scene, x, y), f"scene {seed}")
+                        np.testing.assert_array_equal(drawn["index"], oracle.index(scene, x, y), f"scene {seed}")
                     edges += int(brute_force.trace(scene, x[j, i], y[j, i]).doubt < 1e-14)
                     tried += 1
     assert tried > 100
@@ -431,4 +431,4 @@ def test_a_ray_that_touches_a_sphere_hits_it_and_the_next_float_misses(
     assert (x[7, -1], y[7, -1]) == (touching, 0.0)
     seen = every(accuracy).layers(found, 16, 15)["index"]
     assert seen[7].tolist() == [0] * 16
-    np.testing.assert_array_equal(seen, scene_oracle.index(scene, x, y))
+    np.testing.assert_array_equal(seen, oracle.index(scene, x, y))

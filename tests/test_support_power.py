@@ -324,10 +324,11 @@ def test_the_command_prints_every_coefficient_and_writes_the_header(
     tmp_path: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "support").mkdir()
-    (tmp_path / "support" / "power.h.j2").write_text((TEMPLATES / "support" / "power.h.j2").read_text())
+    for template, _, _ in command.HEADERS:
+        (tmp_path / template).write_text((TEMPLATES / template).read_text())
     assert command.main(["--write", "--templates", str(tmp_path)]) == 0
     written, printed = (tmp_path / "support" / "power.h").read_text(), capsys.readouterr().out
-    assert written == (SUPPORT / "power.h").read_text()
+    assert all((tmp_path / name).read_text() == (TEMPLATES / name).read_text() for _, name, _ in command.HEADERS)
     for form in (DOUBLE, FLOAT):
         for coefficient in (*power_tables(form).exp2_tail, *power_tables(form).log_tail):
             assert form.literal(coefficient) in printed

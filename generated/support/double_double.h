@@ -78,6 +78,13 @@ static inline double_double dd_scale(double_double x, double power_of_two)
     return scaled;
 }
 
+/* x 2^k */
+static inline double_double dd_ldexp(double_double x, int k)
+{
+    const double_double scaled = {ldexp(x.hi, k), ldexp(x.lo, k)};
+    return scaled;
+}
+
 /* The double nearest to x: hi alone, because hi = RN(hi + lo). */
 static inline double dd_to_double(double_double x)
 {

@@ -21,6 +21,8 @@ from symrender_cg.build.cache import Cache
 from symrender_cg.build.library import CachedKernel
 from symrender_cg.cli.console import counted, duration, listed
 from symrender_cg.cli.levels import accuracies_for
+from symrender_cg.errors import ArgumentError
+from symrender_cg.lower.variants import variant
 from symrender_cg.plan.plan import Plan, plan
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.scene import Scene, load_scene
@@ -33,7 +35,7 @@ COMPILING_THREADS = 2
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One kernel that is asked for."""
+    """One kernel that is asked for; of several levels that rest on one enclosure, the first."""
 
     scene: Scene
     plan: Plan
@@ -41,6 +43,17 @@ class Order:
     bake: bool
     portable: bool
     command: str
+    target: str | None = None
+
+    @property
+    def encloses(self) -> bool:
+        """Whether the kernel is the enclosure of a scene."""
+        return rests_on_enclosure(self.plan, self.accuracy)
+
+    @property
+    def kernel(self) -> str:
+        """What tells the kernels of one scene apart."""
+        return pipeline.ENCLOSURE if self.encloses else variant(self.accuracy, self.target).name
 
     @property
     def numbers(self) -> dict[str, float] | None:
@@ -50,7 +63,7 @@ class Order:
     @property
     def recipe(self) -> str:
         """The recipe under which render_image looks for the kernel."""
-        return pipeline.recipe_of(self.plan, self.accuracy, (self.numbers or {}).items(), self.portable)
+        return pipeline.recipe_of(self.plan, self.kernel, (self.numbers or {}).items(), self.portable)
 
     @property
     def text_recipe(self) -> str:
@@ -78,17 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
     scene_plan = plan(scene)
     accuracies = accuracies_for(scene, arguments.accuracy, bake=arguments.bake)
     folder = Path(arguments.out)
-    orders = [
-        Order(
-            scene,
-            scene_plan,
-            accuracy,
-            arguments.bake,
-            arguments.portable,
-            generate.regenerate_command(arguments.scene, accuracy, bake=arguments.bake),
-        )
-        for accuracy in accuracies
-    ]
+    orders = _orders(arguments, scene, scene_plan, accuracies)
     store = Cache()
     recalled = [None if arguments.passes else _recall(store, order) for order in orders]
     missing = [order for order, built in zip(orders, recalled, strict=True) if built is None]
@@ -110,6 +113,35 @@ def run(arguments: argparse.Namespace) -> int:
         _print_library(built)
     print(f"{duration(time.perf_counter() - begin)} of work")
     return 0
+
+
+def rests_on_enclosure(found: Plan, accuracy: str) -> bool:
+    """Whether the first kernel of that accuracy is the enclosure: of more than one sphere under one light."""
+    return variant(accuracy).settles is not None and found.arrangement is not None
+
+
+def _orders(arguments: argparse.Namespace, scene: Scene, found: Plan, accuracies: Sequence[str]) -> list[Order]:
+    """An order for every kernel that the accuracies call for, each kernel once.
+
+    The command of an enclosure is that of `certified`, whoever asks for it: its text is one.
+    """
+    if arguments.target is not None and "certified" not in accuracies:
+        raise ArgumentError(
+            f"--target {arguments.target}: this is what accuracy certified rounds to; leave it out, or add certified"
+        )
+    orders: dict[str, Order] = {}
+    for accuracy in accuracies:
+        target = arguments.target if accuracy == "certified" else None
+        one = rests_on_enclosure(found, accuracy)
+        command = generate.regenerate_command(
+            arguments.scene,
+            "certified" if one else accuracy,
+            target=None if one else target,
+            bake=arguments.bake,
+        )
+        order = Order(scene, found, accuracy, arguments.bake, arguments.portable, command, target)
+        orders.setdefault(order.kernel, order)
+    return list(orders.values())
 
 
 def _recall(store: Cache, order: Order) -> Built | None:
@@ -136,7 +168,9 @@ def _build(store: Cache, orders: Sequence[Order]) -> list[Built]:
     with ThreadPoolExecutor(COMPILING_THREADS, thread_name_prefix="symrender_cg-build") as pool:
         jobs: list[tuple[Order, Translation, Future[tuple[CachedKernel, float]]]] = []
         for order in orders:
-            translation = pipeline.translate(order.scene, order.accuracy, bake=order.bake, command=order.command)
+            translation = pipeline.translate(
+                order.scene, order.accuracy, target=order.target, bake=order.bake, command=order.command
+            )
             jobs.append((order, translation, pool.submit(_compile, store, order, translation)))
         return [_kept(store, order, translation, *job.result()) for order, translation, job in jobs]
 

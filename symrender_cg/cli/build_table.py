@@ -52,10 +52,10 @@ def build_table(kernels: Sequence[Built], *, passes: bool) -> Table:
     if isinstance(first, SphereTranslation):
         for label, name in _SWELL:
             if name in closed:
-                inside = [f"{built.order.accuracy} {_kernel_operations(built, name) or '-'}" for built in kernels]
+                inside = [f"{built.order.kernel} {_kernel_operations(built, name) or '-'}" for built in kernels]
                 table.add(f"  {label}", "", str(closed[name]), str(_named_operations(first, name)), ", ".join(inside))
     else:
-        _part_swell(table, kernels, first)
+        _part_swell(table, kernels)
     return table
 
 
@@ -124,15 +124,20 @@ def _last_rows(table: Table, built: Built, translation: Translation) -> None:
     table.add("  build", duration(built.seconds), "", "", made)
 
 
-def _part_swell(table: Table, kernels: Sequence[Built], first: SceneTranslation) -> None:
-    """A line a part: its results as one formula each, its named definitions, its steps in every kernel."""
-    for name, part in first.parts.items():
-        inside = []
-        for built in kernels:
-            translation = built.translation
-            assert isinstance(translation, SceneTranslation), "kernels of one scene are of one kind"
-            inside.append(f"{built.order.accuracy} {sum(translation.programs[name].operations().values())}")
-        swell = swell_of(part, first.programs[name])
+def _part_swell(table: Table, kernels: Sequence[Built]) -> None:
+    """A line a part: its results as one formula each, its named definitions, its steps in every kernel that has it.
+
+    Enclosures have parts of their own; where a part is in several kernels, its definitions are those of the first.
+    """
+    translations = []
+    for built in kernels:
+        assert isinstance(built.translation, SceneTranslation), "kernels of one scene are of one kind"
+        translations.append((built.order.kernel, built.translation))
+    for name in dict.fromkeys(name for _, translation in translations for name in translation.parts):
+        having = [(kernel, translation) for kernel, translation in translations if name in translation.parts]
+        inside = [f"{kernel} {sum(t.programs[name].operations().values())}" for kernel, t in having]
+        _, first = having[0]
+        swell = swell_of(first.parts[name], first.programs[name])
         table.add(f"  {name}", "", str(swell.closed), str(swell.named), ", ".join(inside))
 
 

@@ -12,7 +12,7 @@ from symrender_cg.cli.console import Column, Table
 from symrender_cg.cli.levels import accuracies_for
 from symrender_cg.plan.plan import plan
 from symrender_cg.reference.check import check
-from symrender_cg.reference.check_rows import Report
+from symrender_cg.reference.check_rows import Report, Row
 from symrender_cg.scene import load_scene
 
 
@@ -85,7 +85,7 @@ def _print(report: Report) -> None:
         if row.evaluator != last:
             table.section()
             last = row.evaluator
-        verdict = "" if row.bound is None else "holds" if row.holds else "BROKEN"
+        verdict = "" if not row.states else "holds" if row.holds else "BROKEN"
         table.add(
             row.evaluator,
             row.where,
@@ -97,7 +97,7 @@ def _print(report: Report) -> None:
             str(row.non_finite),
             _apart(row.from_numpy),
             _apart(row.from_per_pixel),
-            "none" if row.bound is None else f"{row.bound:.2e}",
+            _bound(row),
             verdict,
         )
     table.show()
@@ -114,6 +114,12 @@ def _print(report: Report) -> None:
         print(
             "wrong hits: points where another surface is seen than the nearest; errors are the largest of any channel"
         )
+
+
+def _bound(row: Row) -> str:
+    if row.bound_ulp is not None:
+        return f"{row.bound_ulp:g} ulp"
+    return "none" if row.bound is None else f"{row.bound:.2e}"
 
 
 def _apart(difference: float | None) -> str:

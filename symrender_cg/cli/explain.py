@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict
 from typing import Any
 
 from symrender_cg.cli import explain_scene, explain_sphere
 from symrender_cg.cli.derivation import finding_data, print_findings
+from symrender_cg.cli.proof import print_proof
 from symrender_cg.errors import ArgumentError
+from symrender_cg.lower.variants import variant
 from symrender_cg.scene import Scene, load_scene
 
 
@@ -17,22 +20,35 @@ def run(arguments: argparse.Namespace) -> int:
     scene = load_scene(arguments.scene)
     if arguments.latex and (arguments.ablate or arguments.findings):
         raise ArgumentError("--latex: findings and ablations are printed as text or as --json; leave --latex out")
+    chosen = variant(arguments.accuracy, arguments.target)
+    if arguments.ablate and chosen.settles:
+        raise ArgumentError(
+            "--ablate: what an effect costs is measured where one kernel draws alone, and accuracy "
+            f"{arguments.accuracy} is drawn by stages; take fast, single, literal or double"
+        )
     if arguments.ablate:
         return _ablate(scene, arguments)
     if arguments.findings:
         return _findings(scene, arguments)
-    from symrender_cg.explain import Explanation, explain
+    from symrender_cg.explain import Explanation, explain, proof_of
 
     width, height = arguments.size
-    found = explain(scene, arguments.accuracy, aspect=width / height, max_error=arguments.max_error)
+    found = explain(
+        scene, arguments.accuracy, target=arguments.target, aspect=width / height, max_error=arguments.max_error
+    )
     if arguments.latex:
         from symrender_cg.cli.latex import document
 
         print(document(found), end="")
-    elif isinstance(found, Explanation):
-        _out(explain_sphere.as_data(found)) if arguments.json else explain_sphere.show(found)
-    else:
-        _out(explain_scene.as_data(found)) if arguments.json else explain_scene.show(found)
+        return 0
+    proof = proof_of(scene, arguments.accuracy, arguments.target, width=width, height=height)
+    if arguments.json:
+        data = explain_sphere.as_data(found) if isinstance(found, Explanation) else explain_scene.as_data(found)
+        _out(data | {"proof": None if proof is None else asdict(proof)})
+        return 0
+    explain_sphere.show(found) if isinstance(found, Explanation) else explain_scene.show(found)
+    if proof is not None:
+        print_proof(proof)
     return 0
 
 

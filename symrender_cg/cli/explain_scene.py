@@ -7,6 +7,7 @@ from typing import Any
 
 from symrender_cg.cli.console import Column, Table, duration
 from symrender_cg.cli.derivation import decision_data, head, print_decisions, print_quantities, quantity_data
+from symrender_cg.cli.proof import print_formats
 from symrender_cg.explain import PartExplanation, SceneExplanation
 from symrender_cg.lower.program import RATES
 
@@ -22,6 +23,7 @@ def as_data(found: SceneExplanation) -> dict[str, Any]:
             "results": list(entry.results),
             "quantities": [quantity_data(q) for q in entry.quantities],
             "operations": entry.operations,
+            "formats": {form: list(names) for form, names in entry.formats},
             "swell": asdict(entry.swell),
         }
 
@@ -65,6 +67,9 @@ def show(found: SceneExplanation) -> None:
         print(f"  gives {', '.join(entry.results)}\n")
         print_quantities(entry.quantities)
 
+    head("number formats of the kernel's quantities")
+    print_formats(_formats(found))
+
     head("operations")
     table = Table(
         (
@@ -82,3 +87,12 @@ def show(found: SceneExplanation) -> None:
         table.add(entry.name, *numbers, kinds)
     table.show()
     print("\n" + ", ".join(f"{stage} {duration(spent)}" for stage, spent in found.seconds.items()))
+
+
+def _formats(found: SceneExplanation) -> list[tuple[str, tuple[str, ...]]]:
+    """The number formats of all parts, each with the quantities that are in it in any part."""
+    merged: dict[str, dict[str, None]] = {}
+    for part in found.parts:
+        for form, names in part.formats:
+            merged.setdefault(form, {}).update(dict.fromkeys(names))
+    return [(form, tuple(names)) for form, names in merged.items()]

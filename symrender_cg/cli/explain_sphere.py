@@ -7,6 +7,7 @@ from typing import Any
 
 from symrender_cg.cli.console import Column, Table, duration
 from symrender_cg.cli.derivation import decision_data, head, print_decisions, print_quantities, quantity_data
+from symrender_cg.cli.proof import print_formats
 from symrender_cg.explain import CENTRED, Explanation
 
 
@@ -30,6 +31,7 @@ def as_data(found: Explanation) -> dict[str, Any]:
         "hit_where": [condition(name) for name in found.guard],
         "forms": [{"name": f.name, "removes": f.removes, "source": f.source} for f in found.forms],
         "chosen": [quantity_data(q) for q in found.chosen],
+        "formats": {form: list(names) for form, names in found.formats},
         "invariants": [
             {"name": i.name, "statement": i.statement, "holds": i.holds, "detail": i.detail} for i in found.invariants
         ],
@@ -78,6 +80,9 @@ def show(found: Explanation) -> None:
     table.show()
     print()
     print_quantities(found.chosen)
+
+    head("number formats of the kernel's quantities")
+    print_formats(found.formats)
 
     head("proved by sympy, exactly")
     for invariant in found.invariants:

@@ -15,15 +15,19 @@ from symrender_cg.scene import Scene
 def accuracies_for(scene: Scene, asked: Sequence[str] | str, *, bake: bool = False) -> tuple[str, ...]:
     """`all` -> every accuracy that the scene can have, the others named on stderr; a list -> that list.
 
-    Raises OutsidePlanError where a list asks for one that the scene cannot have, ArgumentError for a scene that cannot
-    be baked.
+    Baked, `all` are the accuracies whose kernels can be: of those that prove their values the numbers are arguments.
+    Raises OutsidePlanError where a list asks for one that the scene cannot have, ArgumentError for a scene, or an
+    accuracy of a list, that cannot be baked.
     """
     found = plan(scene)
     possible = []
     for name in ACCURACIES if asked == "all" else asked:
+        chosen = variant(name)
+        if asked == "all" and bake and chosen.settles:
+            continue
         try:
-            require_kind(found, variant(name), bake=bake)
-            require_format(found, variant(name).shading)
+            require_kind(found, chosen, bake=bake)
+            require_format(found, chosen.shading)
         except OutsidePlanError as refusal:
             if asked != "all":
                 raise

@@ -7,7 +7,7 @@ import sys
 from typing import NoReturn
 
 from symrender_cg.errors import ArgumentError
-from symrender_cg.lower.variants import ACCURACIES
+from symrender_cg.lower.variants import ACCURACIES, TARGETS
 from symrender_cg.version import VERSION
 
 LARGEST_SIDE = 1 << 24
@@ -28,6 +28,8 @@ examples:
   python -m symrender_cg explain off_axis               the plan and the derivation
   python -m symrender_cg explain mirrors --ablate       what each effect costs
   python -m symrender_cg check                          the kernels against numpy and the oracle
+  python -m symrender_cg stress                         accuracy levels on hard cases
+  python -m symrender_cg conditioning -o moved.png      how much half an ulp of the inputs moves each pixel
   python -m symrender_cg doctor                         what this machine has and lacks
 """
 
@@ -108,6 +110,33 @@ examples:
   python -m symrender_cg check --json > check.json
 """
 
+_STRESS = """\
+Measures accuracy levels on families of hard cases, each drawn from a seed and compared with the oracle: outlines to the
+last float, eyes and lights on the surface or 1e300 away, exponents to 1e300, edges of shadows, mirrors and tiles. With
+SCENE that scene's own hard points: outlines, terminators, highlights, edges. Errors are those of the unclipped field.
+
+Exit code 4 when a level breaks what it states; the statements, family and case are printed below the table."""
+_STRESS_EXAMPLES = """\
+examples:
+  python -m symrender_cg stress
+  python -m symrender_cg stress --family terminator --family rdv0 --level double --count 2000
+  python -m symrender_cg stress mirrors --level double
+  python -m symrender_cg stress --seed 7 --keep worst.json
+  python -m symrender_cg stress --atlas atlas.png
+"""
+
+_CONDITIONING = """\
+How much half an ulp of every input (each number of the scene in the camera's frame, and the point) moves each pixel,
+in first order: what no kernel can be blamed for. A pixel flips where such a move takes a decision over its border: an
+outline, the edge of a shadow or a tile, the nearer of two surfaces. Prints one line of figures of the pixels that show
+a surface; with -o also draws a picture, colours on a log scale, flips marked."""
+_CONDITIONING_EXAMPLES = """\
+examples:
+  python -m symrender_cg conditioning
+  python -m symrender_cg conditioning mirrors -o moved.png --size 320x180
+  python -m symrender_cg conditioning far_small --json
+"""
+
 _DOCTOR = """\
 Says what this machine has: compiler, flags and target as resolved, the vector width in the kernels' inner loops (from
 the compiler's own report), the cache, Python packages; and how to get what is missing. Exit code 5 without a compiler
@@ -145,6 +174,8 @@ def build_parser() -> Parser:
     _add_render(commands)
     _add_explain(commands)
     _add_check(commands)
+    _add_stress(commands)
+    _add_conditioning(commands)
     _add_doctor(commands)
     return parser
 
@@ -166,6 +197,7 @@ def _add_build(commands: argparse._SubParsersAction[Parser]) -> None:
     parser = _command(commands, "build", "derive, write the C, compile", _BUILD, _BUILD_EXAMPLES)
     parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
     _accuracies(parser, "all")
+    _target(parser)
     parser.add_argument("--bake", action="store_true", help="fold the scene's numbers into the kernel (one sphere)")
     _portable(parser)
     parser.add_argument("--out", default="generated", metavar="DIR", help="folder for the C (default: generated)")
@@ -180,6 +212,7 @@ def _add_render(commands: argparse._SubParsersAction[Parser]) -> None:
     parser.add_argument("-o", "--output", metavar="FILE", help="the image file: .png, .npy, .npz or .pfm")
     _size(parser, (512, 512))
     _accuracy(parser)
+    _target(parser)
     parser.add_argument("--threads", type=int, metavar="N", help="threads (default: by size; any number, same bits)")
     parser.add_argument("--bits", type=int, choices=(8, 16), help="of a .png (default: 8)")
     parser.add_argument("--encoding", choices=("srgb", "linear"), help="of a .png (default: srgb)")
@@ -202,6 +235,7 @@ def _add_explain(commands: argparse._SubParsersAction[Parser]) -> None:
     parser = _command(commands, "explain", "the plan, the derivation, the proofs", _EXPLAIN, _EXPLAIN_EXAMPLES)
     parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
     _accuracy(parser)
+    _target(parser)
     forms = parser.add_mutually_exclusive_group()
     forms.add_argument("--latex", action="store_true", help="a whole LaTeX document (article class, amsmath)")
     forms.add_argument("--json", action="store_true", help="everything as one JSON object")
@@ -225,6 +259,30 @@ def _add_check(commands: argparse._SubParsersAction[Parser]) -> None:
     _accuracies(parser, "all")
     _portable(parser)
     parser.add_argument("--json", action="store_true", help="the table as one JSON object")
+
+
+def _add_stress(commands: argparse._SubParsersAction[Parser]) -> None:
+    parser = _command(commands, "stress", "accuracy levels on hard cases", _STRESS, _STRESS_EXAMPLES)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help="a scene whose own hard points are meant")
+    parser.add_argument("--level", action="append", default=[], metavar="LEVEL", help="once or more; all if left out")
+    parser.add_argument("--family", action="append", default=[], metavar="NAME", help="once or more; all if left out")
+    parser.add_argument(
+        "--count", type=_count_from_one, default=200, metavar="N", help="cases a family, or points a set (default: 200)"
+    )
+    parser.add_argument("--seed", type=_count, default=1, metavar="N", help="of the cases (default: 1)")
+    parser.add_argument("--json", action="store_true", help="the table as one JSON object")
+    parser.add_argument("--keep", metavar="FILE", help="add the worst point of each row to FILE")
+    parser.add_argument("--atlas", metavar="FILE", help="draw where each level breaks instead: .png, .svg or .pdf")
+
+
+def _add_conditioning(commands: argparse._SubParsersAction[Parser]) -> None:
+    short = "how much the inputs' last digits move each pixel"
+    parser = _command(commands, "conditioning", short, _CONDITIONING, _CONDITIONING_EXAMPLES)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
+    parser.add_argument("-o", "--output", metavar="FILE", help="the picture: .png, .svg or .pdf (needs matplotlib)")
+    _size(parser, (256, 256))
+    parser.add_argument("--absolute", action="store_true", help="absolute moves in the picture, not ulp of the pixel")
+    parser.add_argument("--json", action="store_true", help="the figures as one JSON object")
 
 
 def _add_doctor(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -261,6 +319,15 @@ def _accuracies(parser: Parser, default: str) -> None:
         default=default,
         metavar="A[,A]",
         help=f"some of {', '.join(ACCURACIES)}, with commas, or all (default: {default})",
+    )
+
+
+def _target(parser: Parser) -> None:
+    parser.add_argument(
+        "--target",
+        choices=TARGETS,
+        metavar="T",
+        help=f"what accuracy certified rounds to: {', '.join(TARGETS)} (default: {TARGETS[0]})",
     )
 
 
@@ -308,6 +375,12 @@ def tolerance(text: str) -> float:
     if 0.0 <= value < float("inf"):
         return value
     raise argparse.ArgumentTypeError(f"{text!r} is not a tolerance; expected a number >= 0, such as 0.002")
+
+
+def _count_from_one(text: str) -> int:
+    if (count := _count(text)) > 0:
+        return count
+    raise argparse.ArgumentTypeError(f"{text!r} is not a count; expected a whole number from 1 up")
 
 
 def _count(text: str) -> int:

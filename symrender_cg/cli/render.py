@@ -1,6 +1,6 @@
 """`render`: a scene -> an image file, and its layers beside it; a progress bar where it takes over a second.
 
-On a warm start: no sympy, no templates, no rich.
+What proves its values also prints its certificate. On a warm start: no sympy, no templates, no rich.
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ from symrender_cg.cli.console import Column, Table, duration
 from symrender_cg.cli.layers import chosen_layers, write_layers
 from symrender_cg.cli.progress import Progress
 from symrender_cg.errors import ArgumentError
-from symrender_cg.output import SUFFIXES, image_format, write_image
-from symrender_cg.pipeline import draw, pixel_size, planned, statistics
+from symrender_cg.lower.variants import Variant, variant
+from symrender_cg.output import SUFFIXES, ImageFormat, image_format, write_image
+from symrender_cg.pipeline import draw, enclosure_name, pixel_size, planned, statistics
+from symrender_cg.run.certify import Certified, Job, settle_image
+from symrender_cg.run.levels import job_of
 from symrender_cg.run.render import evaluate, render_layers, shape_of
 from symrender_cg.run.threads import over_rows, thread_count
 from symrender_cg.scene import Scene, load_scene
@@ -36,11 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
             f"-o FILE is missing: where should the image go? expected a file's name that ends in {_suffixes()}"
         )
     target = Path(arguments.output)
-    form = image_format(target, bits=arguments.bits, encoding=arguments.encoding)
-    if arguments.no_clip and not form.keeps_field:
-        raise ArgumentError(f"--no-clip: a {form.suffix} cannot hold intensities above 1; write a .npy, .npz or .pfm")
-    if arguments.layers and arguments.backend == "numpy":
-        raise ArgumentError("--layers: layers come from the native kernel; leave --backend numpy out")
+    chosen = variant(arguments.accuracy, arguments.target)
+    grey_levels = chosen.result == "uint8"
+    form = image_format(target, bits=arguments.bits, encoding=arguments.encoding, levels=grey_levels)
+    _require_possible(arguments, chosen, form)
     if target.is_dir() or not target.parent.is_dir():
         raise ArgumentError(
             f"{target}: {'is a folder' if target.is_dir() else 'its folder does not exist'}; expected a file's name in "
@@ -56,8 +58,41 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _require_possible(arguments: argparse.Namespace, chosen: Variant, form: ImageFormat) -> None:
+    """Raises ArgumentError for options that exclude each other."""
+    if arguments.no_clip and chosen.result == "uint8":
+        raise ArgumentError("--no-clip: grey levels end at 255; leave it out, or ask for --target float32 or float64")
+    if arguments.no_clip and not form.keeps_field:
+        raise ArgumentError(f"--no-clip: a {form.suffix} cannot hold intensities above 1; write a .npy, .npz or .pfm")
+    if arguments.layers and arguments.backend == "numpy":
+        raise ArgumentError("--layers: layers come from the native kernel; leave --backend numpy out")
+    if chosen.settles and arguments.layers:
+        raise ArgumentError(
+            f"--layers: accuracy {arguments.accuracy} proves the image alone, not its layers; leave --layers out, or "
+            "take double"
+        )
+    if chosen.settles and arguments.backend == "numpy":
+        raise ArgumentError(
+            f"--backend numpy: accuracy {arguments.accuracy} is proved by native kernels; leave --backend out, or take "
+            "double"
+        )
+
+
 def _image_alone(arguments: argparse.Namespace, scene: Scene, target: Path) -> None:
     width, height = arguments.size
+    job = None
+    if arguments.backend == "native":
+        job = job_of(
+            scene,
+            arguments.accuracy,
+            arguments.target,
+            clip=not arguments.no_clip,
+            portable=arguments.portable,
+            threads=arguments.threads,
+        )
+    if job is not None:
+        _proved(arguments, job, target)
+        return
     begin = time.perf_counter()
     with Progress(height, "rendering", "rows") as progress:
         values, kernel = render_in_blocks(
@@ -75,6 +110,33 @@ def _image_alone(arguments: argparse.Namespace, scene: Scene, target: Path) -> N
         progress.now(f"writing {target.name}")
         form = write_image(target, values, bits=arguments.bits, encoding=arguments.encoding)
     print(f"{target}: {width} x {height}, {form}; {arguments.accuracy}, {kernel}, rendered in {duration(seconds)}")
+
+
+def _proved(arguments: argparse.Namespace, job: Job, target: Path) -> None:
+    """Draws stage by stage; what is not proved raises AccuracyError, and nothing is written."""
+    width, height = arguments.size
+    begin, compiled, derived = time.perf_counter(), statistics.compiled, statistics.derived
+    with Progress(height, f"proving by {arguments.accuracy}", "rows") as progress:
+        found: Certified = settle_image(job, width, height)
+        seconds = time.perf_counter() - begin
+        progress.done(height)
+        progress.now(f"writing {target.name}")
+        form = write_image(target, found.values, bits=arguments.bits, encoding=arguments.encoding)
+    level = arguments.accuracy if arguments.target is None else f"{arguments.accuracy} {arguments.target}"
+    handed_over = not variant(arguments.accuracy).settles
+    how = f"{level}, drawn by the compensated kernel:" if handed_over else f"{level},"
+    kernel = f"{_first_kernel(job, width / height)} {_origin(compiled, derived)}"
+    print(f"{target}: {width} x {height}, {form}; {how} {kernel}, rendered in {duration(seconds)}")
+    why = "plain float64 may be off by more than 1e-15 in this scene; " if handed_over else ""
+    print(f"{why}{found.certificate}")
+
+
+def _first_kernel(job: Job, aspect: float) -> str:
+    """The C name of the kernel of a job's first stage."""
+    plan = planned(job.scene, aspect=aspect)
+    if plan.arrangement is None:
+        return f"{plan.name}_{job.variant.name}"
+    return enclosure_name(planned(job.scene))
 
 
 def _with_layers(arguments: argparse.Namespace, scene: Scene, target: Path) -> None:
@@ -159,7 +221,7 @@ def _by_numpy(
     pixel = pixel_size(frame, height)
     x = (np.arange(width, dtype=np.float64) + 0.5 - 0.5 * width) * np.float64(pixel)
     y = (0.5 * height - 0.5 - np.arange(height, dtype=np.float64)) * np.float64(pixel)
-    image = np.empty(shape_of(frame, height, width), np.float32 if accuracy == "single" else np.float64)
+    image = np.empty(shape_of(frame, height, width), variant(accuracy).result)
     for first in range(0, height, rows):
         block = y[first : first + rows, np.newaxis]
         image[first : first + rows] = evaluate(

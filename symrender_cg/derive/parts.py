@@ -130,11 +130,9 @@ def sphere_part(*, near: bool, mirrored: bool) -> Part:
         )
     )
     if not near:
-        height2 = (S("distance") - S("radius")) * (S("distance") + S("radius")) / S("radius") ** 2
         half = sp.sqrt(S("alpha"))
         silhouette = "silhouette"
         more += [
-            Definition("height2", height2, silhouette, "kappa^2 - 1"),
             Definition(
                 "row_low",
                 focal * (depth * offset_y - half) / S("height2"),

@@ -14,6 +14,7 @@ from sympy.codegen.ast import Comment, Declaration, Variable, value_const
 
 from symrender_cg.derive.symbols import symbol
 from symrender_cg.emit.printer import C_TYPES, KernelPrinter
+from symrender_cg.lower.formats import WIDE
 from symrender_cg.lower.nodes import Call
 from symrender_cg.lower.program import KernelProgram, Step, operations_of
 
@@ -62,7 +63,7 @@ class Bodies:
     def word(self, name: str) -> str:
         """The C expression of a quantity in `shade`, as one floating-point number: the high word of a double-double."""
         place = self.pixel_places.get(name, "")
-        return place + (f"{name}.hi" if self.format[name] == "double_double" else name)
+        return place + (f"{name}.hi" if self.format[name] in WIDE else name)
 
     @property
     def row_uses_frame(self) -> bool:

@@ -15,6 +15,7 @@ import jinja2
 from symrender_cg.derive.exact import SignTest
 from symrender_cg.derive.symbols import INPUTS
 from symrender_cg.emit.bodies import Bodies, counts, operations
+from symrender_cg.emit.settling import settling
 from symrender_cg.lower.nodes import Call, walk
 from symrender_cg.lower.program import RATES, KernelProgram
 from symrender_cg.lower.variants import Variant
@@ -28,9 +29,18 @@ SUPPORT = {
     "units.h": ("unit_exponent", "light_exponent", "point_unit"),
     "square.h": ("square",),
     "phong_power.h": ("power", "powerf", "power_of_cosine", "power_of_cosinef"),
+    "fast_power.h": ("fast_powerf", "fast_power_of_cosinef"),
     "double_double.h": ("dd_",),
+    "pair.h": ("pair_",),
+    "precise_power.h": ("precise_power_of_cosine",),
     "exact_sign.h": None,
+    "range.h": None,
+    "settle.h": None,
 }
+"""Support headers and the functions that call for them, in the order in which they are included."""
+
+CARRIED = {"phong_power.h": ("power.h",), "fast_power.h": ("power.h",), "precise_power.h": ("power.h",)}
+"""Headers that a support header includes itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,17 +79,15 @@ def emit(
 
     writer = Bodies(program, baked=numbers is not None)
     uses = {node.function for step in program.steps for node in walk(step.value) if isinstance(node, Call)}
-    double_double = any(step.format == "double_double" for step in program.steps)
-    includes = [
-        header
-        for header, functions in SUPPORT.items()
-        if header == "inline.h"
-        or (header == "exact_sign.h" and variant.exact)
-        or (header == "span.h" and program.ends)
-        or (header == "units.h" and variant.exact and not program.ends)
-        or (header == "double_double.h" and double_double)
-        or (functions and header != "double_double.h" and uses & set(functions))
-    ]
+    formats = {step.format for step in program.steps}
+    always = {"inline.h"}
+    always |= {"exact_sign.h"} if variant.exact and (program.ends or not variant.settles) else set()
+    always |= {"span.h"} if program.ends else set()
+    always |= {"units.h"} if variant.exact and not program.ends else set()
+    always |= {"double_double.h"} if "double_double" in formats else set()
+    always |= {"pair.h"} if "pair" in formats else set()
+    always |= {"range.h", "settle.h"} if variant.settles else set()
+    includes = [h for h, functions in SUPPORT.items() if h in always or uses & set(functions or ())]
     context = {
         "name": kernel,
         "version": VERSION,
@@ -89,7 +97,7 @@ def emit(
         "baked": numbers is not None,
         "baked_numbers": ", ".join(f"{key} {value:.6g}" for key, value in (numbers or {}).items()),
         "includes": includes,
-        "real": "float" if variant.shading == "float32" else "double",
+        "real": variant.c_type,
         "single": variant.shading == "float32",
         "span": program.ends is not None,
         "exact": variant.exact,
@@ -101,11 +109,14 @@ def emit(
         "tests_front": len(program.hit) > 1,
         "writer": writer,
     }
-    source = environment().get_template("kernel.c.j2").render(context)
+    if variant.settles:
+        assert numbers is None, "a kernel that bounds its error has its numbers as arguments"
+        context |= settling(program, writer)
+    template = "settling.c.j2" if variant.settles else "kernel.c.j2"
+    source = environment().get_template(template).render(context)
     header = environment().get_template("kernel.h.j2").render(context)
     files = {f"{kernel}.c": source, f"{kernel}.h": header}
-    carried = ("grid.h", *includes, *(("power.h",) if "phong_power.h" in includes else ()))
-    files |= {h: template_path(f"support/{h}").read_text(encoding="utf-8") for h in carried}
+    files |= support_files(("grid.h", *includes))
     return Emitted(
         name=kernel,
         files=files,
@@ -114,6 +125,12 @@ def emit(
         result_type=str(context["real"]),
         operations={rate: dict(operations(program.at(rate))) for rate in RATES if rate != "sphere"},
     )
+
+
+def support_files(headers: Sequence[str]) -> dict[str, str]:
+    """The texts of support headers and of those that they include themselves, by name."""
+    wanted = dict.fromkeys((*headers, *(inner for header in headers for inner in CARRIED.get(header, ()))))
+    return {header: template_path(f"support/{header}").read_text(encoding="utf-8") for header in wanted}
 
 
 @cache

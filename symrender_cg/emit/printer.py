@@ -39,6 +39,9 @@ C_TYPES: Mapping[str, Type] = {
     "float32": Type("float"),
     "float64": Type("double"),
     "double_double": Type("double_double"),
+    "pair": Type("double_double"),
+    "range": Type("range"),
+    "ball": Type("ball"),
 }
 
 _ATOM, _PREFIX, _TIMES, _PLUS, _COMPARE, _AND, _CHOICE = range(7)

@@ -14,14 +14,13 @@ from symrender_cg.derive.exact import sign_tests
 from symrender_cg.derive.image import derive_sphere
 from symrender_cg.derive.parts import Part
 from symrender_cg.emit.bodies import INDENT, body, closure, counts, operations
-from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test
+from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test, support_files
 from symrender_cg.emit.parts import PrimaryBodies
 from symrender_cg.emit.scene_fields import Needs, field_lines, scene_fields
 from symrender_cg.lower.nodes import Call, walk
 from symrender_cg.lower.program import RATES, KernelProgram
 from symrender_cg.lower.variants import Variant
 from symrender_cg.plan.plan import Plan
-from symrender_cg.resources import template_path
 from symrender_cg.version import VERSION
 
 _LOOP = 2 * INDENT
@@ -149,11 +148,10 @@ def emit_scene(
         "cost": _cost(programs),
         **writer.context(),
     }
-    source = _tidy(environment().get_template("scene.c.j2").render(context))
+    source = tidied(environment().get_template("scene.c.j2").render(context))
     header = environment().get_template("scene.h.j2").render(context)
     files = {f"{name}.c": source, f"{name}.h": header}
-    carried = ("grid.h", *includes, *(("power.h",) if "phong_power.h" in includes else ()))
-    files |= {h: template_path(f"support/{h}").read_text(encoding="utf-8") for h in carried}
+    files |= support_files(("grid.h", *includes))
     steps = [step for program in programs.values() for step in program.steps]
     total: dict[str, dict[str, int]] = {
         rate: dict(operations(step for step in steps if step.rate == rate)) for rate in RATES
@@ -225,7 +223,7 @@ def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Prim
     distance = bodies.pixel(("hit_distance",) if bodies.has_sphere else ("hit_distance", "descent"))
     sight = bodies.sight() if bodies.has_sphere else []
     stores = [f"p->{target}[at + i] = {bodies.carried_word(source)};" for target, source in _targets(bodies, stored)]
-    tests = _sign_tests(near=kind == "near") if bodies.has_sphere else ()
+    tests = hit_tests(near=kind == "near") if bodies.has_sphere else ()
     return Primary(
         name=kind,
         title=_TITLES[kind],
@@ -260,7 +258,8 @@ def _void(lines: Iterable[str], names: Iterable[str]) -> str:
     return INDENT + " ".join(f"(void){name};" for name in absent) + "\n" if absent else ""
 
 
-def _sign_tests(*, near: bool) -> tuple[dict[str, object], ...]:
+def hit_tests(*, near: bool) -> tuple[dict[str, object], ...]:
+    """The polynomials whose signs decide whether a ray hits sphere k; `near`: it may lie behind the eye."""
     image = derive_sphere("sphere", front_test=near, diffuse=False, specular=False, gated=False)
 
     def place(factor: str) -> str:
@@ -298,7 +297,7 @@ def _cost(programs: Mapping[str, KernelProgram]) -> list[str]:
     return lines
 
 
-def _tidy(text: str) -> str:
+def tidied(text: str) -> str:
     """Without the blank lines that left-out parts leave behind."""
     lines: list[str] = []
     for line in text.split("\n"):

@@ -62,6 +62,14 @@ def part_operations(translation: Translation) -> dict[str, dict[str, dict[str, i
     return {name: by_rate(program) for name, program in translation.programs.items()}
 
 
+def by_format(program: KernelProgram) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """(number format, the quantities in it), in the order in which the formats first appear."""
+    found: dict[str, list[str]] = {}
+    for step in program.steps:
+        found.setdefault(step.format, []).append(step.name)
+    return tuple((form, tuple(names)) for form, names in found.items())
+
+
 def by_rate(program: KernelProgram) -> dict[str, dict[str, int]]:
     """Rate -> kind -> operations, in the order of the rates."""
     found: dict[str, dict[str, int]] = {}

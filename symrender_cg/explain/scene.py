@@ -5,10 +5,11 @@ Comes in: its translation. Goes out: SceneExplanation, frozen, of text and numbe
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from symrender_cg.explain.operations import Swell, by_rate, swell_of
+from symrender_cg.explain.operations import Swell, by_format, by_rate, swell_of
 from symrender_cg.explain.quantities import Quantity, latex_symbols, quantity
 from symrender_cg.plan.plan import Decision, Plan
 
@@ -35,9 +36,16 @@ MEANINGS: Final = {
 }
 
 
+_ENCLOSED: Final = {"near": "a sphere and a ray of the eye: hit, normal, distance"}
+"""Parts that mean more in an enclosure."""
+
+
 @dataclass(frozen=True, slots=True)
 class PartExplanation:
-    """One part: what it is, the names it takes by rate and gives, its definitions, its operations by rate and kind."""
+    """One part: what it is, the names it takes by rate and gives, its definitions, its operations by rate and kind.
+
+    formats: the number formats of its steps, each with the quantities in it.
+    """
 
     name: str
     meaning: str
@@ -47,6 +55,7 @@ class PartExplanation:
     quantities: tuple[Quantity, ...]
     operations: dict[str, dict[str, int]]
     swell: Swell
+    formats: tuple[tuple[str, tuple[str, ...]], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,23 +94,27 @@ def explain_scene(translation: SceneTranslation) -> SceneExplanation:
         flags=tuple(sorted(found.flags)),
         decisions=found.summary,
         counts=_counts(found),
-        parts=tuple(_part(part, translation.programs[name]) for name, part in translation.parts.items()),
+        parts=tuple(
+            _part(part, translation.programs[name], MEANINGS | (_ENCLOSED if translation.encloses else {}))
+            for name, part in translation.parts.items()
+        ),
         seconds=dict(translation.seconds),
         operations={rate: dict(sorted(counts.items())) for rate, counts in emitted.operations.items()},
     )
 
 
-def _part(part: Part, program: KernelProgram) -> PartExplanation:
+def _part(part: Part, program: KernelProgram, meanings: Mapping[str, str]) -> PartExplanation:
     names = latex_symbols((d.name, d.value) for d in part.definitions)
     return PartExplanation(
         name=part.name,
-        meaning=MEANINGS.get(part.name, ""),
+        meaning=meanings.get(part.name, ""),
         inputs=part.inputs,
         rates=tuple((name, rate) for name, rate in part.rates if name in part.inputs),
         results=part.results,
         quantities=tuple(quantity(d.name, d.value, d.meaning, d.source, d.section, names) for d in part.definitions),
         operations=by_rate(program),
         swell=swell_of(part, program),
+        formats=by_format(program),
     )
 
 

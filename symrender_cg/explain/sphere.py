@@ -18,7 +18,7 @@ from symrender_cg.derive import forms
 from symrender_cg.derive.exact import sign_tests
 from symrender_cg.derive.proofs import Invariant, prove_invariants
 from symrender_cg.derive.symbols import INPUTS, symbol
-from symrender_cg.explain.operations import swollen_operations
+from symrender_cg.explain.operations import by_format, swollen_operations
 from symrender_cg.explain.quantities import Quantity, latex_symbols, quantity
 from symrender_cg.plan.plan import Decision
 from symrender_cg.run.numbers import numbers_of
@@ -63,7 +63,11 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """All of it; `operations` counts the kernel's operations by rate (frame, row, pixel) and kind."""
+    """All of it.
+
+    formats      the number formats of the kernel, each with the quantities in it
+    operations   of the kernel by rate (frame, row, pixel) and kind
+    """
 
     kernel: str
     accuracy: str
@@ -74,6 +78,7 @@ class Explanation:
     guard: tuple[str, ...]
     forms: tuple[ChosenForm, ...]
     chosen: tuple[Quantity, ...]
+    formats: tuple[tuple[str, tuple[str, ...]], ...]
     invariants: tuple[Invariant, ...]
     silhouette: Silhouette
     stages: tuple[Step, ...]
@@ -114,6 +119,7 @@ def explain_sphere(translation: SphereTranslation) -> Explanation:
             for s in first.steps
             if (s.name, s.value) not in own
         ),
+        formats=by_format(translation.program),
         invariants=prove_invariants(image),
         silhouette=_silhouette(translation, numbers),
         stages=_stages(translation),

@@ -24,13 +24,15 @@ def fit_minimax(
     weight: Callable[[Real], Real],
     interval: tuple[Real, Real],
     degree: int,
+    *,
+    digits: int = DIGITS,
 ) -> tuple[Real, ...]:
     """Coefficients c of the polynomial p with the least max of |weight (p - function)| over the interval's grid.
 
     The grid is Chebyshev's and avoids both ends, so function and weight may be singular there. The weight is positive.
     Remez, "Sur le calcul effectif des polynomes d'approximation de Tchebichef", 1934.
     """
-    with mpmath.workdps(DIGITS):
+    with mpmath.workdps(digits):
         middle, radius = (mpmath.mpf(interval[0]) + interval[1]) / 2, (mpmath.mpf(interval[1]) - interval[0]) / 2
         grid = [middle - radius * mpmath.cos(mpmath.pi * (2 * k + 1) / (2 * GRID)) for k in range(GRID)]
         values, weights = [function(x) for x in grid], [weight(x) for x in grid]

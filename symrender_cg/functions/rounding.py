@@ -82,7 +82,7 @@ def bound_power(
         unit_log = max(of_sum, *(_below_one(k, sums, unit) for k in range(-1, LOWEST_BINADE - 1, -1)))
         exps = _exp2_errors(exp2_tail, ball(Fraction(exp2_error)), unit)
         exp2 = max(relative for _, _, relative in exps)
-        power = max(_power_error(k, exps, unit_log, unit) for k in range(0, LOWEST_EXPONENT, -1))
+        power = max(power_error(k, exps, unit_log, unit) for k in range(0, LOWEST_EXPONENT, -1))
         return PowerBounds(*(upward(x) for x in (of_sum / unit, unit_log / unit, exp2 / unit, power)))
 
 
@@ -94,24 +94,38 @@ def _log2_errors(
     Below, f - (...) rounds to f, and the error is that of a rounded constant and one product: less than on any piece.
     """
     pieces = []
-    limit = Fraction(5, 16) if sign < 0 else Fraction(3, 8)
-    edges = [limit]
-    for octave in range(-1, SMALLEST_OCTAVE, -1):
-        steps = (Fraction(2) ** octave * (1 - Fraction(k, 2 * PIECES_OF_AN_OCTAVE)) for k in range(PIECES_OF_AN_OCTAVE))
-        edges += [edge for edge in steps if edge < limit]
+    edges = octave_edges(Fraction(5, 16) if sign < 0 else Fraction(3, 8), SMALLEST_OCTAVE)
     inverse = 1 / flint.arb(2).log()
     scale = Rounded(inverse, above(inverse_ln2 - inverse), unit)
     for high, low in itertools.pairwise(edges):
-        f = Rounded(ball(sign * (high + low) / 2) + ball((high - low) / 2) * flint.arb(0, 1), flint.arb(0), unit)
-        s = f / (_exact(2, unit) + f)
-        z = s * s
-        half_square = _exact(0.5, unit) * f * f
-        rest = half_square - s * (half_square + z * _by_pairs(tail, z))
-        log2 = (f - rest) * scale
+        f = Rounded(between(sign * high, sign * low), flint.arb(0), unit)
+        log2 = ln_of_sum(f, tail) * scale
         true = (1 + f.value).log() * inverse
         absolute = log2.error + above(true) * fit
         pieces.append((true, absolute, above(absolute / below(true))))
     return pieces
+
+
+def ln_of_sum(f: Rounded, tail: tuple[float, ...]) -> Rounded:
+    """ln(1 + f) as power.h computes it, without the error of the polynomial."""
+    s = f / (exact(2, f.unit) + f)
+    z = s * s
+    half_square = exact(0.5, f.unit) * f * f
+    return f - (half_square - s * (half_square + z * _by_pairs(tail, z)))
+
+
+def octave_edges(limit: Fraction, smallest_octave: int) -> list[Fraction]:
+    """Points from `limit` down to about 2^smallest_octave, each octave in equal steps: relative errors need them."""
+    edges = [limit]
+    for octave in range(-1, smallest_octave, -1):
+        steps = (Fraction(2) ** octave * (1 - Fraction(k, 2 * PIECES_OF_AN_OCTAVE)) for k in range(PIECES_OF_AN_OCTAVE))
+        edges += [edge for edge in steps if edge < limit]
+    return edges
+
+
+def between(one: Fraction, other: Fraction) -> Ball:
+    """The ball of all numbers from one end to the other."""
+    return ball((one + other) / 2) + ball(abs(one - other) / 2) * flint.arb(0, 1)
 
 
 def _below_one(k: int, sums: dict[int, list[tuple[Ball, Ball, Ball]]], unit: Ball) -> Ball:
@@ -131,15 +145,20 @@ def _exp2_errors(tail: tuple[float, ...], fit: Ball, unit: Ball) -> list[tuple[B
     for piece in range(PIECES_OF_A_UNIT):
         r_ball = ball((piece + Fraction(1, 2)) * width - Fraction(1, 2)) + ball(width / 2) * flint.arb(0, 1)
         r = Rounded(r_ball, flint.arb(0), unit)
-        r2 = r * r
-        power = _exact(1, unit) + (_exact(tail[0], unit) * r + r2 * _by_pairs(tail[1:], r, r2))
+        power = exact(1, unit) + exp2_minus_one(r, tail)
         true = (r_ball * log_2).exp()
         absolute = power.error + above(true) * fit
         pieces.append((r_ball, absolute, above(absolute / below(true))))
     return pieces
 
 
-def _power_error(k: int, exps: list[tuple[Ball, Ball, Ball]], log2_error: Ball, unit: Ball) -> Ball:
+def exp2_minus_one(r: Rounded, tail: tuple[float, ...]) -> Rounded:
+    """2^r - 1 as power.h computes it, without the error of the polynomial."""
+    r2 = r * r
+    return exact(tail[0], r.unit) * r + r2 * _by_pairs(tail[1:], r, r2)
+
+
+def power_error(k: int, exps: list[tuple[Ball, Ball, Ball]], log2_error: Ball, unit: Ball) -> Ball:
     """Largest absolute error of 2^y, y = k + r = n log2 x, from all three: the logarithm, the product with n, and 2^y.
 
     From y = -24 down, v (|ln v| e + e') is below 2^-18 of its maximum.
@@ -161,7 +180,7 @@ def _by_pairs(tail: tuple[float, ...], x: Rounded, x2: Rounded | None = None) ->
     square = x * x if x2 is None else x2
     pairs = [tail[k : k + 2] for k in range(0, len(tail), 2)]
     terms = [
-        _exact(pair[0], x.unit) + _exact(pair[1], x.unit) * x if len(pair) == 2 else _exact(pair[0], x.unit)
+        exact(pair[0], x.unit) + exact(pair[1], x.unit) * x if len(pair) == 2 else exact(pair[0], x.unit)
         for pair in pairs
     ]
     total = terms[-1]
@@ -170,7 +189,8 @@ def _by_pairs(tail: tuple[float, ...], x: Rounded, x2: Rounded | None = None) ->
     return total
 
 
-def _exact(constant: float, unit: Ball) -> Rounded:
+def exact(constant: float, unit: Ball) -> Rounded:
+    """A constant without error."""
     return Rounded(flint.arb(constant), flint.arb(0), unit)
 
 

@@ -1,13 +1,14 @@
-"""Formats: after freezing, every operation is given operands of its own format, and double-double its functions.
+"""Formats: after freezing, every operation is given operands of its own format, and wide formats their functions.
 
 float64 and float32 steps keep their operations; a wider operand is rounded on the way in. A double-double step becomes
-calls of double_double.h, each with the error bound stated there: two_sum and two_prod where both operands are float64.
+calls of double_double.h, a step of pairs calls of pair.h, each with the error bound stated there: two_sum and two_prod
+where both operands are float64.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import sympy as sp
 from sympy.core.symbol import Str
@@ -15,22 +16,54 @@ from sympy.core.symbol import Str
 from symrender_cg.derive.symbols import symbol
 from symrender_cg.lower.nodes import (
     INTEGER_FUNCTIONS,
+    Both,
     Call,
     Cast,
     Difference,
     Larger,
     Negative,
     Node,
+    NotNegative,
     Number,
     Part,
+    Positive,
     Product,
     Quotient,
     Root,
+    Select,
     Sum,
+    Zero,
     call,
     number,
 )
 from symrender_cg.lower.program import RATES, Format, KernelProgram, Rate, Step
+
+
+WIDE: tuple[Format, ...] = ("double_double", "pair")
+"""Formats whose numbers are hi + lo; both are of the C type double_double."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """The functions of a wide format; what is exact (dd_sum, dd_product, dd_neg, dd_scale) serves both."""
+
+    add: str
+    add_double: str
+    mul: str
+    mul_double: str
+    div: str
+    sqrt: str
+    positive_part: str
+
+
+_WORDS: dict[str, _Words] = {
+    "double_double": _Words(
+        "dd_add", "dd_add_double", "dd_mul", "dd_mul_double", "dd_div", "dd_sqrt", "dd_positive_part"
+    ),
+    "pair": _Words(
+        "pair_add", "pair_add_double", "pair_mul", "pair_mul_double", "pair_div", "pair_sqrt", "pair_positive_part"
+    ),
+}
 
 
 def convert_formats(program: KernelProgram) -> KernelProgram:
@@ -53,17 +86,17 @@ def convert_formats(program: KernelProgram) -> KernelProgram:
     for step in program.steps:
         if step.format == "float32":
             for used in sorted(step.uses()):
-                if wide(used) in ("float64", "double_double") and used not in rounded:
+                if wide(used) in ("float64", *WIDE) and used not in rounded:
                     rounded.add(used)
-                    source = Part(Str("hi"), symbol(used)) if wide(used) == "double_double" else symbol(used)
+                    source = Part(Str("hi"), symbol(used)) if wide(used) in WIDE else symbol(used)
                     value = Cast(Str("float32"), source)
                     rate = rates.get(used, "frame")
                     steps.append(Step(_single(used), value, step.section, "", "", rate, "float32"))
             value = step.value.xreplace({symbol(u): symbol(_single(u)) for u in step.uses() & rounded})
             steps.append(replace(step, value=_typed(value, "float32")))
-        elif step.format == "double_double":
-            value, form = _double_double(step.value, wide)
-            steps.append(replace(step, value=value if form == "double_double" else call("dd_from", value)))
+        elif step.format in WIDE:
+            value, is_wide = _in_words(step.value, wide, step.format)
+            steps.append(replace(step, value=value if is_wide else call("dd_from", value)))
         else:
             value = _typed(step.value, "float64") if step.format == "float64" else step.value
             steps.append(replace(step, value=_split(value, wide)))
@@ -90,7 +123,7 @@ def _split(value: sp.Basic, format_of: Callable[[str], Format]) -> sp.Basic:
     """float64 operations on double-double symbols: the high word, or both where the symbol is added to a float64."""
 
     def is_wide(a: sp.Basic) -> bool:
-        return bool(a.is_Symbol and format_of(a.name) == "double_double")
+        return bool(a.is_Symbol and format_of(a.name) in WIDE)
 
     def go(node: sp.Basic) -> sp.Basic:
         if is_wide(node):
@@ -108,55 +141,90 @@ def _split(value: sp.Basic, format_of: Callable[[str], Format]) -> sp.Basic:
     return go(value)
 
 
-def _double_double(value: sp.Basic, format_of: Callable[[str], Format]) -> tuple[sp.Basic, Format]:
-    """A frozen expression in calls of double_double.h, and whether it is a float64 leaf or a double-double."""
+def _in_words(value: sp.Basic, format_of: Callable[[str], Format], target: Format) -> tuple[sp.Basic, bool]:
+    """A frozen expression in calls of the target's functions, and whether it is wide or a float64."""
+    words = _WORDS[target]
 
-    def lift(node: sp.Basic, form: Format) -> sp.Basic:
-        return node if form == "double_double" else call("dd_from", node)
+    def lift(operand: tuple[sp.Basic, bool]) -> sp.Basic:
+        node, is_wide = operand
+        return node if is_wide else call("dd_from", node)
 
-    def go(node: sp.Basic) -> tuple[sp.Basic, Format]:
+    def go(node: sp.Basic) -> tuple[sp.Basic, bool]:
         if node.is_Symbol:
-            return node, "double_double" if format_of(node.name) == "double_double" else "float64"
+            return node, format_of(node.name) in WIDE
         if isinstance(node, Number):
-            return number(node.value, "float64"), "float64"
-        if isinstance(node, Call) and node.function == "square":
-            inner, form = go(node.args[1])
-            return _binary("dd_product", "dd_mul_double", "dd_mul", (inner, form), (inner, form)), "double_double"
+            return number(node.value, "float64"), False
+        if isinstance(node, Select):
+            condition, first, second = node.args
+            chosen = [lift(go(branch)) for branch in (first, second)]
+            return call("pair_select", _condition(condition), *chosen), True
+        if isinstance(node, Call):
+            return _called(node)
         operands = [go(argument) for argument in node.args]
         if isinstance(node, Negative):
-            inner, form = operands[0]
-            return (call("dd_neg", inner), form) if form == "double_double" else (Negative(inner), form)
+            inner, is_wide = operands[0]
+            return (call("dd_neg", inner), True) if is_wide else (Negative(inner), False)
         if isinstance(node, Root):
-            return call("dd_sqrt", lift(*operands[0])), "double_double"
+            return call(words.sqrt, lift(operands[0])), True
         if isinstance(node, Larger):
-            assert node.args[1].value == 0, "only max(0, a) has a double-double form"
-            return call("dd_positive_part", lift(*operands[0])), "double_double"
+            assert node.args[1].value == 0, "only max(0, a) has a wide form"
+            return call(words.positive_part, lift(operands[0])), True
         if isinstance(node, Quotient):
-            return call("dd_div", lift(*operands[0]), lift(*operands[1])), "double_double"
+            if target == "pair" and isinstance(node.args[0], Number) and node.args[0].value == 1:
+                return call("pair_inverse", lift(operands[1])), True
+            return call(words.div, lift(operands[0]), lift(operands[1])), True
         first, second = operands
         if isinstance(node, Product):
-            return _binary("dd_product", "dd_mul_double", "dd_mul", first, second), "double_double"
+            if target == "pair" and second[1] and node.args[0] == node.args[1]:
+                return call("pair_square", second[0]), True
+            if isinstance(first[0], Number) and second[1] and _is_power_of_two(first[0]):
+                return call("dd_scale", second[0], first[0]), True
+            return _binary("dd_product", words.mul_double, words.mul, first, second), True
         if isinstance(node, Sum):
-            return _binary("dd_sum", "dd_add_double", "dd_add", first, second), "double_double"
-        assert isinstance(node, Difference), f"{node} has no double-double form"
-        if first[1] == second[1] == "float64":
-            return call("dd_difference", first[0], second[0]), "double_double"
-        if second[1] == "float64":
-            return call("dd_add_double", first[0], Negative(second[0])), "double_double"
-        return call("dd_sub", lift(*first), second[0]), "double_double"
+            return _binary("dd_sum", words.add_double, words.add, first, second), True
+        assert isinstance(node, Difference), f"{node} has no wide form"
+        if not first[1] and not second[1]:
+            return call("dd_difference", first[0], second[0]), True
+        if not second[1]:
+            return call(words.add_double, first[0], Negative(second[0])), True
+        if not first[1] and target == "pair":
+            return call(words.add_double, call("dd_neg", second[0]), first[0]), True
+        return call(words.add.replace("add", "sub"), lift(first), second[0]), True
+
+    def _called(node: Call) -> tuple[sp.Basic, bool]:
+        arguments = node.args[1:]
+        if node.function == "square":
+            inner = go(arguments[0])
+            if target == "pair" and inner[1]:
+                return call("pair_square", inner[0]), True
+            return _binary("dd_product", words.mul_double, words.mul, inner, inner), True
+        if node.function == "ldexp":
+            inner = go(arguments[0])
+            return (call("dd_ldexp", inner[0], arguments[1]), True) if inner[1] else (node, False)
+        assert node.function == "precise_power_of_cosine", f"{node} has no wide form"
+        exponent, is_wide = go(arguments[2])
+        assert not is_wide, "an exponent is an input"
+        cosines = (call("pair_normalised", lift(go(argument))) for argument in arguments[:2])
+        return call(node.function, *cosines, exponent), True
+
+    def _condition(node: sp.Basic) -> sp.Basic:
+        if isinstance(node, Both):
+            return Both(*(_condition(argument) for argument in node.args))
+        assert isinstance(node, Positive | NotNegative | Zero), f"{node} is no condition on a wide number"
+        inner, is_wide = go(node.args[0])
+        return node.func(Sum(Part(Str("hi"), inner), Part(Str("lo"), inner)) if is_wide else inner)
 
     return go(value)
 
 
-def _binary(
-    exact: str,
-    mixed: str,
-    full: str,
-    first: tuple[sp.Basic, Format],
-    second: tuple[sp.Basic, Format],
-) -> sp.Basic:
-    """The call for a commutative operation on operands of either format."""
-    (a, form_a), (b, form_b) = first, second
-    if form_a == form_b:
-        return call(full if form_a == "double_double" else exact, a, b)
-    return call(mixed, a, b) if form_a == "double_double" else call(mixed, b, a)
+def _is_power_of_two(node: Number) -> bool:
+    value = sp.Rational(node.value)
+    return bool(value > 0 and (value.p & (value.p - 1)) == 0 and (value.q & (value.q - 1)) == 0)
+
+
+def _binary(exact: str, mixed: str, full: str, first: tuple[sp.Basic, bool], second: tuple[sp.Basic, bool]) -> sp.Basic:
+    """The call for a commutative operation on operands of either kind."""
+    (a, wide_a), (b, wide_b) = first, second
+    if wide_a == wide_b:
+        return call(full if wide_a else exact, a, b)
+    return call(mixed, a, b) if wide_a else call(mixed, b, a)

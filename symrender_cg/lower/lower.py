@@ -37,6 +37,8 @@ from symrender_cg.plan.plan import Plan
 FUNCTIONS = {
     "float64": {"power": "power", "cosine": "power_of_cosine"},
     "float32": {"power": "powerf", "cosine": "power_of_cosinef"},
+    "fast": {"power": "fast_powerf", "cosine": "fast_power_of_cosinef"},
+    "pair": {"power": "power", "cosine": "precise_power_of_cosine"},
 }
 
 
@@ -68,11 +70,12 @@ def lower(
         ("scale lengths", passes.scale_lengths if variant.exact else _raw_inputs),
         ("regularise", passes.regularise),
         *((("whole exponent", baked_exponent),) if exponent is not None else ()),
-        ("lower powers", lambda program: passes.lower_powers(program, FUNCTIONS[variant.shading])),
+        ("lower powers", lambda program: passes.lower_powers(program, FUNCTIONS[variant.powers])),
         ("place", passes.place),
         ("hoist", passes.hoist),
         ("share", passes.share),
         ("place shares", passes.place),
+        *((("carry slow steps in full", passes.carry_slow_in_full),) if variant.shading == "pair" else ()),
         ("freeze", freeze),
         ("convert formats", convert_formats),
         *((("bake", lambda program: bake(program, numbers)),) if numbers is not None else ()),
@@ -95,13 +98,15 @@ def choose_forms(image: ImageProgram, plan: Plan, variant: Variant) -> KernelPro
     off_axis, front_test = plan.needs("off_axis"), plan.needs("front_test")
     entries = (forms.form(name) for name in variant.forms)
     chosen = tuple(entry for entry in entries if entry.fits(image, off_axis=off_axis, front_test=front_test))
-    program = forms.apply(image, chosen, keep=("d_dot_d",) if variant.exact else ())  # how sure a hit is, is in |D|^2
     ends = next((entry.ends for entry in chosen if entry.ends), None)
+    wanted = ("extent_x", "extent_y") if variant.settles and ends else ()
+    sight = ("d_dot_d",) if variant.exact else ()  # how sure a hit is, is in |D|^2
+    program = forms.apply(image, chosen, keep=(*sight, *wanted))
     steps = tuple(Step(d.name, d.value, d.section, d.meaning, d.source) for d in program.definitions)
     order = [row.name for row in INPUTS]
     inputs = tuple(sorted((name for name in program.inputs if name not in ("x", "y")), key=order.index))
     name = f"{plan.name}_{variant.name}"
-    return KernelProgram(name, steps, program.guard, ends, program.value, inputs, program.background)
+    return KernelProgram(name, steps, program.guard, ends, program.value, inputs, program.background, wanted)
 
 
 def _raw_inputs(program: KernelProgram) -> KernelProgram:

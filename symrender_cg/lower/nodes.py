@@ -133,7 +133,7 @@ class Call(Node):
         return str(self.args[0].name)
 
 
-INTEGER_FUNCTIONS = frozenset({"ldexp", "unit_exponent", "light_exponent"})
+INTEGER_FUNCTIONS = frozenset({"ldexp", "dd_ldexp", "unit_exponent", "light_exponent"})
 """Functions whose whole-number arguments are of type int."""
 
 

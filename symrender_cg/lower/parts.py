@@ -50,7 +50,7 @@ def lower_part(part: Part, variant: Variant) -> KernelProgram:
         program = passes.scale_lengths(program, farthest=30 if single else 60)
     for step in (
         passes.regularise,
-        lambda p: passes.lower_powers(p, FUNCTIONS[variant.shading]),
+        lambda p: passes.lower_powers(p, FUNCTIONS[variant.powers]),
         passes.place,
         passes.hoist,
         passes.share,

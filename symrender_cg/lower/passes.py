@@ -23,7 +23,7 @@ def assign_formats(program: KernelProgram, variant: Variant, *, exact: bool = Tr
     """
     per_pixel = frozenset() if program.ends else variant.per_pixel_exact
     wide: frozenset[str] = variant.double_double | per_pixel if exact else frozenset()
-    shading: Format = "float32" if variant.shading == "float32" else "float64"
+    shading: Format = variant.shading
 
     def chosen(name: str) -> Format:
         if name in wide:
@@ -78,10 +78,12 @@ def scale_lengths(program: KernelProgram, *, farthest: int | None = None) -> Ker
     if "radius" in program.inputs:
         head.append(Step("world_exponent", call("unit_exponent", radius), section, "R 2^k in [1, 2)", format="int"))
     head += [Step(name, call("ldexp", raw[symbol(name)], world), section) for name in scaled if "radius" in scaled]
-    limit = sp.Integer(farthest or (30 if program[program.result].format == "float32" else 60))
+    limit = sp.Integer(farthest or FARTHEST[program[program.result].format])
     offsets = [step for step in program.steps if step.name.startswith("from_center_")]
     if offsets:
-        head += [replace(step, value=step.value.xreplace(raw), format="float64") for step in offsets]
+        head += [
+            replace(step, value=step.value.xreplace(raw), format=_at_least_float64(step.format)) for step in offsets
+        ]
         exponent = call("light_exponent", world, radius, *(step.symbol for step in offsets), limit)
         meaning = f"farther than 2^{limit} R a light shines in parallel"
         head.append(Step("lamp_exponent", exponent, offsets[0].section, meaning, format="int"))
@@ -91,15 +93,22 @@ def scale_lengths(program: KernelProgram, *, farthest: int | None = None) -> Ker
             body.append(replace(step, value=call("ldexp", eye, plane)))
         elif step.name.startswith("lamp_"):
             offset = symbol(step.name.replace("lamp", "from_center"))
-            body.append(
-                replace(step, value=step.value.xreplace({offset: call("ldexp", offset, lamp)}), format="float64")
-            )
+            value = step.value.xreplace({offset: call("ldexp", offset, lamp)})
+            body.append(replace(step, value=value, format=_at_least_float64(step.format)))
         elif step not in offsets:
             body.append(step)
     others = {s: t for s, t in raw.items() if s.name not in scaled}
     body = [replace(step, value=step.value.xreplace(others)) for step in body]
     inputs = tuple(f"scene_{name}" for name in program.inputs)
     return replace(program, steps=tuple(head + body), inputs=inputs, background=f"scene_{program.background}")
+
+
+FARTHEST: dict[Format, int] = {"float32": 30, "float64": 60, "pair": 200}
+"""A light farther than 2^this radii is brought to that distance: by the format of the shading."""
+
+
+def _at_least_float64(form: Format) -> Format:
+    return "float64" if form == "float32" else form
 
 
 def lower_powers(program: KernelProgram, functions: dict[str, str]) -> KernelProgram:
@@ -225,6 +234,14 @@ def place(program: KernelProgram) -> KernelProgram:
         rates[step.name] = max((rates.get(name, 0) for name in step.uses()), default=0)
         steps.append(replace(step, rate=RATES[rates[step.name]]))
     return program.with_steps(steps)
+
+
+def carry_slow_in_full(program: KernelProgram) -> KernelProgram:
+    """What does not change with the pixel is a double-double rather than a pair: it costs nothing there."""
+    return program.with_steps(
+        replace(step, format="double_double") if step.format == "pair" and step.rate != "pixel" else step
+        for step in program.steps
+    )
 
 
 def hoist(program: KernelProgram) -> KernelProgram:

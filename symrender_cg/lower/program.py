@@ -13,7 +13,7 @@ from symrender_cg.derive.symbols import symbol
 from symrender_cg.lower.nodes import Node, count
 
 Rate = Literal["frame", "sphere", "row", "pixel"]
-Format = Literal["int", "float32", "float64", "double_double"]
+Format = Literal["int", "float32", "float64", "double_double", "pair", "range", "ball"]
 RATES: tuple[Rate, ...] = ("frame", "sphere", "row", "pixel")
 """From the slowest to the fastest. Kernels of one sphere have no step at the rate of the sphere: it is the frame's."""
 

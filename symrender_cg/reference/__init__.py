@@ -2,14 +2,13 @@
 
     per_pixel     the seed's Cell 1, a python loop                     a reference
     vectorised    the seed's Cell 4, and the stable forms by numpy     a reference, and the backend without a compiler
-    oracle        exact integers and Arb balls, correctly rounded      the truth
     points        pixel centres, and points where an image is hard to get right
     compare       largest errors of float values against the oracle's answers
 
     brute_force   every ray, sphere, blocker and bounce by numpy, no plan       a reference for all scenes
-    scene_oracle  the same in exact integers and Arb balls                      the truth for all scenes
+    oracle        exact numbers and Arb balls, correctly rounded                the truth for all scenes
 
-The first five take a Scene with one sphere and one light. All move it to the camera's frame and take those numbers as
+The first four take a Scene with one sphere and one light. All move it to the camera's frame and take those numbers as
 exact.
 Import the module that you need: only `oracle` and `compare` load python-flint.
 """

@@ -10,15 +10,17 @@ see different things, 4 to 45 times, so that the edge is from 1/16 to 3e-14 of a
     near mirrored     the same surface, but other surfaces in it, or another tile of the plane
     near shadows      the same surfaces, but another light reaches the first of them: shadow edges and terminators
 
-Stated bounds, on |value - truth| of each channel, I the brightest value of any point: 1e-13 max(1, I) for double, 1e-5
-max(1, I) for single, and what is seen is right at every point: of double without exception, of single but for which of
-two surfaces that cut each other is in front, within its rounding of their depths. Measured, not proved: on the built-in
-scenes the largest errors on an image are 1.1e-15 and 9.0e-7, near edges in a mirror 7.6e-14 and 9.4e-6. There the bound
-leaves room for what mirrors do: what one rounding turns a direction by grows at each bounce on a sphere by twice the
-distance over its radius, so that no bound over all scenes can be stated. So a point that misses it is `in doubt` and
-counted apart where brute force says that its value rests on a decision within rounding (at the edge of a shadow or of a
-tile, the terminator of a gated highlight, an outline in a mirror), or that roundings grow along its rays beyond the
-bound. Other points that miss it break it.
+Stated of levels that prove their values, at every point without exception: 4 ulp (stable), half an ulp (certified),
+and what is seen is right. Stated bounds of the others, on |value - truth| of each channel, I the brightest value of
+any point: 1e-13 max(1, I) for double, 1e-5 max(1, I) for single, 2^-11 max(1, I) for fast where n <= 1000, and what is
+seen is right at every point: of double without exception, of single and fast but for which of two surfaces that cut
+each other is in front, within its rounding of their depths. Measured, not proved: on the built-in scenes the largest
+errors on an image are 1.1e-15 and 9.0e-7, near edges in a mirror 7.6e-14 and 9.4e-6. There the bound leaves room for
+what mirrors do: what one rounding turns a direction by grows at each bounce on a sphere by twice the distance over its
+radius, so that no bound over all scenes can be stated. So a point that misses it is `in doubt` and counted apart where
+brute force says that its value rests on a decision within rounding (at the edge of a shadow or of a tile, the
+terminator of a gated highlight, an outline in a mirror), or that roundings grow along its rays beyond the bound. Other
+points that miss it break it.
 """
 
 from __future__ import annotations
@@ -33,18 +35,19 @@ import numpy.typing as npt
 from msgspec import structs
 
 from symrender_cg.pipeline import draw, pixel_size
-from symrender_cg.reference import brute_force, compare, scene_oracle
-from symrender_cg.reference.check_rows import Row
+from symrender_cg.reference import brute_force, compare, oracle
+from symrender_cg.reference.check_rows import FAST_SHININESS, STATED_ULP, Row
 from symrender_cg.run.drawing import Drawing
+from symrender_cg.run.levels import job_of
 from symrender_cg.run.numbers import numbers_of
-from symrender_cg.run.render import shape_of
+from symrender_cg.run.render import evaluate, shape_of
 from symrender_cg.run.scene_kernel import SceneKernel
 from symrender_cg.run.scene_numbers import scene_numbers
 from symrender_cg.scene import Phong, Scene
 
-BOUNDS = {"double": 1e-13, "single": 1e-5}
-UNIT_ROUNDOFF = {"double": 2.0**-53, "single": 2.0**-24}
-DOUBT = {"double": 1e-9, "single": 1e-4}
+BOUNDS = {"double": 1e-13, "single": 1e-5, "fast": 2.0**-11}
+UNIT_ROUNDOFF = {"double": 2.0**-53, "single": 2.0**-24, "fast": 2.0**-24}
+DOUBT = {"double": 1e-9, "single": 1e-4, "fast": 1e-4}
 """Margin of a decision below which the formats' roundings may take it either way."""
 EXACT_ORDER = frozenset({"double"})
 """Accuracies that decide exactly which of two surfaces that cut each other is in front; all decide hit or miss so."""
@@ -82,8 +85,13 @@ def scene_rows(
         sets += edge_points(frame, width / height, count, seed)
     rows: list[Row] = []
     for points in sets:
-        answers, traced = scene_oracle.evaluate(frame, points.x, points.y), brute_force.trace(frame, points.x, points.y)
+        answers, traced = oracle.evaluate(frame, points.x, points.y), brute_force.trace(frame, points.x, points.y)
         for accuracy in accuracies:
+            job = job_of(scene, accuracy, clip=False, portable=portable)
+            if job is not None:
+                stated = STATED_ULP[job.variant.name.partition("_")[0]]
+                rows.append(_of_stages(frame, accuracy, points, answers, traced, stated, portable))
+                continue
             drawing = draw(scene, accuracy, size=points.size, portable=portable)
             rows.append(_of_kernel(scene, accuracy, drawing, points, answers, traced))
         row = _row("brute force", "", points, traced.value, answers, traced.index)
@@ -96,7 +104,7 @@ def _of_kernel(
     accuracy: str,
     drawing: Drawing,
     points: _Points,
-    answers: scene_oracle.SceneAnswers,
+    answers: oracle.Answers,
     traced: brute_force.Traced,
 ) -> Row:
     values = _values(scene, drawing, points)
@@ -121,8 +129,47 @@ def _of_kernel(
         row,
         in_doubt=int(np.count_nonzero(doubtful)),
         from_numpy=float(apart.max(initial=0.0)),
-        bound=bound,
+        bound=bound if _states(scene, accuracy) else None,
     )
+
+
+def _states(scene: Scene, accuracy: str) -> bool:
+    """Whether a bound is stated: of `fast` where no highlight has an exponent above FAST_SHININESS."""
+    materials = [sphere.material for sphere in scene.spheres]
+    if scene.plane is not None:
+        materials += [one for one in (scene.plane.material, scene.plane.checker) if one is not None]
+    return accuracy != "fast" or all(one.specular == 0.0 or one.shininess <= FAST_SHININESS for one in materials)
+
+
+def _of_stages(
+    frame: Scene,
+    accuracy: str,
+    points: _Points,
+    answers: oracle.Answers,
+    traced: brute_force.Traced,
+    stated: float,
+    portable: bool,
+) -> Row:
+    """Of a level that proves its values, at every point; what is seen is asked of it as values of their own."""
+    values = evaluate(frame, points.x, points.y, accuracy=accuracy, portable=portable)
+    codes = evaluate(_numbered(frame), points.x, points.y, accuracy=accuracy, portable=portable)
+    row = _row(f"kernel {accuracy}", accuracy, points, values, answers, codes.astype(np.int64) - 1, stated)
+    apart = np.abs(values - traced.value)[traced.doubt >= DOUBT["double"]]
+    apart = apart[np.isfinite(apart)]
+    return replace(row, from_numpy=float(apart.max(initial=0.0)))
+
+
+def _numbered(frame: Scene) -> Scene:
+    """The scene where the surface with index k has the value k + 1 everywhere, and the background 0."""
+    spheres = tuple(structs.replace(s, material=_flat(k + 1.0)) for k, s in enumerate(frame.spheres))
+    plane = frame.plane
+    if plane is not None:
+        plane = structs.replace(plane, material=_flat(len(spheres) + 1.0), checker=None)
+    return structs.replace(frame, spheres=spheres, plane=plane, lights=(), background=0.0, max_bounces=0)
+
+
+def _flat(ambient: float) -> Phong:
+    return Phong(ambient, 0.0, 0.0, 1.0)
 
 
 def _row(
@@ -130,14 +177,15 @@ def _row(
     accuracy: str,
     points: _Points,
     values: npt.NDArray[Any],
-    answers: scene_oracle.SceneAnswers,
+    answers: oracle.Answers,
     index: npt.NDArray[Any],
+    bound_ulp: float | None = None,
 ) -> Row:
-    errors = compare.measure(values, answers.answers)
+    errors = compare.measure(values, answers)
     wrong = int(np.count_nonzero(index != answers.index))
-    return Row(
-        evaluator, accuracy, points.where, points.x.size, errors.max_ulp, errors.max_abs, wrong, 0, errors.nonfinite
-    )
+    ulp = math.inf if bound_ulp is not None and errors.flips else errors.max_ulp
+    where, count, broken = points.where, points.x.size, errors.nonfinite
+    return Row(evaluator, accuracy, where, count, ulp, errors.max_abs, wrong, 0, broken, bound_ulp=bound_ulp)
 
 
 # ------------------------------------------------------------------------------------------------- what a kernel says

@@ -39,7 +39,8 @@ class Errors:
 def measure(values: npt.ArrayLike, answers: Answers, hit: npt.ArrayLike | None = None) -> Errors:
     """error = (value - answers.value) - answers.residual, for float64 or float32 values in the shape of the answers.
 
-    hit: the evaluator's own hit or miss decisions, when it has them. Raises ArgumentError for another dtype or shape.
+    hit: the evaluator's own hit or miss decisions, one a point, when it has them; a flip counts in each channel.
+    Raises ArgumentError for another dtype or shape.
     """
     given = np.asarray(values)
     if given.dtype not in (np.dtype(np.float64), np.dtype(np.float32)):
@@ -47,15 +48,16 @@ def measure(values: npt.ArrayLike, answers: Answers, hit: npt.ArrayLike | None =
     single = given.dtype == np.dtype(np.float32)
     answer = answers.value32 if single else answers.value
     decided = None if hit is None else np.asarray(hit, dtype=np.bool_)
-    for name, array in (("values", given), ("hit", decided)):
-        if array is not None and array.shape != answer.shape:
-            raise ArgumentError(f"{name}: shape {array.shape}; expected that of the answers, {answer.shape}")
+    for name, array, shape in (("values", given, answer.shape), ("hit", decided, answers.index.shape)):
+        if array is not None and array.shape != shape:
+            raise ArgumentError(f"{name}: shape {array.shape}; expected that of the answers, {shape}")
     if given.size == 0:
         return Errors(0.0, 0.0, 0.0, 0, 0, 0, ())
     broken = ~np.isfinite(given) & np.isfinite(answer)
     flipped = ((given == 0) != (answer == 0)) & ~broken
     if decided is not None:
-        flipped |= decided != answers.hit
+        other = decided != answers.hit
+        flipped |= other if other.ndim == flipped.ndim else other[..., np.newaxis]
     usable = np.isfinite(given) & np.isfinite(answer)
     error = np.zeros(given.shape)
     np.subtract(given, answers.value, out=error, where=usable, dtype=np.float64)

@@ -59,7 +59,7 @@ def frame_numbers(scene: Scene) -> FrameNumbers:
     for kind, members in (("spheres", scene.spheres), ("lights", scene.lights)):
         if len(members) != 1:
             raise OutsidePlanError(
-                f"{kind}: {len(members)} of them; the references and the oracle take exactly one; "
+                f"{kind}: {len(members)} of them; the references of one sphere take exactly one; "
                 "compare scenes of one sphere and one light with them"
             )
     framed = scene.in_camera_frame()

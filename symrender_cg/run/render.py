@@ -12,6 +12,10 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from symrender_cg.errors import ArgumentError, OutsidePlanError
 from symrender_cg.pipeline import draw, pixel_size
+from symrender_cg.run.bounds import error_bounds
+from symrender_cg.run.certify import Certified, settle_image, settle_points
+from symrender_cg.run.grid import pixel_centres
+from symrender_cg.run.levels import drawn_as, job_of
 from symrender_cg.run.scene_kernel import LAYERS, layer_arrays
 from symrender_cg.run.threads import over_rows, thread_count
 from symrender_cg.scene import PointLight, Scene, load_scene
@@ -28,6 +32,7 @@ def render_image(
     height: int = 256,
     *,
     accuracy: str = "double",
+    target: str | None = None,
     clip: bool = True,
     out: NDArray[Any] | None = None,
     threads: int | None = None,
@@ -41,7 +46,9 @@ def render_image(
     Row 0 is at the top.
 
     scene      a Scene, a built-in scene's name, a path of a TOML file; none is Chapter 1's scene
-    accuracy   "literal" (the seed's formula), "double" (cancellation-free float64), "single" (float32, returns it)
+    accuracy   "literal" (the seed's formula), "single" (float32, returns it), "double" (cancellation-free float64),
+               "stable" (within 4 ulp), "certified" (every value correctly rounded, see `certify`)
+    target     what "certified" rounds to, and returns: "float64", "float32" or "uint8" (grey levels of 0 to 255)
     clip       cut to [0, 1] as a picture is; False keeps the field itself, which may exceed 1
     out        array of that shape and dtype to write into; any strides, writable
     threads    threads over rows; any number gives the same bits
@@ -50,23 +57,57 @@ def render_image(
     backend    "native", or "numpy", which needs no compiler (by hand-written numpy, slower)
     cache      folder for compiled kernels; by default SYMRENDER_CACHE_DIR, or the user's cache folder
 
-    Raises ArgumentError, SceneError, OutsidePlanError or ToolchainError, see symrender_cg.errors.
+    Raises ArgumentError, SceneError, OutsidePlanError or ToolchainError, and AccuracyError where a certificate cannot be
+    given, see symrender_cg.errors.
     """
     width, height = _side("width", width), _side("height", height)
     chosen = load_scene(scene)
     shape = shape_of(chosen, height, width)
     if backend == "numpy":
         frame = chosen.in_camera_frame()
-        values = _numpy_backend(frame, *_grid(width, height, pixel_size(frame, height)), accuracy, clip)
+        columns, rows = pixel_centres(width, height, pixel_size(frame, height))
+        values = _numpy_backend(frame, columns[np.newaxis, :], rows[:, np.newaxis], accuracy, clip)
         return values if out is None else _copied(values, _checked(out, shape, values.dtype))
     _require_native(backend)
-    drawing = draw(chosen, accuracy, size=(width, height), clip=clip, bake=bake, portable=portable, cache=cache)
+    job = job_of(chosen, accuracy, target, clip=clip, bake=bake, portable=portable, cache=cache, threads=threads)
+    if job is not None:
+        if out is not None:
+            _checked(out, shape, np.dtype(job.variant.result))
+        values = settle_image(job, width, height).values
+        return values if out is None else _copied(values, out)
+    drawn = drawn_as(chosen, accuracy)
+    drawing = draw(chosen, drawn, size=(width, height), clip=clip, bake=bake, portable=portable, cache=cache)
     image = np.empty(shape, drawing.dtype) if out is None else _checked(out, shape, drawing.dtype)
-    target = image
+    canvas = image
     if drawing.shape(height, width) != shape or not _rows_are_contiguous(image):
-        target = np.empty(drawing.shape(height, width), drawing.dtype)
-    over_rows(partial(drawing.rows, target), height, thread_count(threads, width * height))
-    return image if target is image else _copied(_as_colour(target, shape), image)
+        canvas = np.empty(drawing.shape(height, width), drawing.dtype)
+    over_rows(partial(drawing.rows, canvas), height, thread_count(threads, width * height))
+    return image if canvas is image else _copied(_as_colour(canvas, shape), image)
+
+
+def certify(
+    scene: Scene | str | Path | None = None,
+    width: int = 256,
+    height: int = 256,
+    *,
+    target: str = "float64",
+    clip: bool = True,
+    threads: int | None = None,
+    portable: bool = False,
+    cache: str | Path | None = None,
+) -> Certified:
+    """The image with every value correctly rounded to the target, and the certificate: (values, certificate).
+
+    target     "float64", "float32": nearest, ties to even; "uint8": floor(255 I + 1/2) of the intensity I cut to [0, 1]
+
+    The certificate says how many pixels each stage settled, and with which bound. Other arguments as for render_image.
+    Raises AccuracyError, whose message and `points` (row * width + column) name the pixels, where a value rests on a
+    tie that nothing decides.
+    """
+    width, height = _side("width", width), _side("height", height)
+    job = job_of(load_scene(scene), "certified", target, clip=clip, portable=portable, cache=cache, threads=threads)
+    assert job is not None
+    return settle_image(job, width, height)
 
 
 def render_layers(
@@ -97,7 +138,8 @@ def render_layers(
     if unknown := [name for name in names if name not in LAYERS]:
         raise ArgumentError(f"layers: {unknown[0]!r} is not known; expected some of {', '.join(LAYERS)}")
     chosen = load_scene(scene)
-    drawing = draw(chosen, accuracy, size=(width, height), clip=clip, portable=portable, force=("scene",), cache=cache)
+    drawn = drawn_as(chosen, accuracy)
+    drawing = draw(chosen, drawn, size=(width, height), clip=clip, portable=portable, force=("scene",), cache=cache)
     arrays = layer_arrays(names, (height, width), drawing.channels, len(chosen.lights))
     image = np.empty(drawing.shape(height, width), drawing.dtype)
     over_rows(partial(drawing.rows, image, layers=arrays), height, thread_count(threads, width * height))
@@ -120,25 +162,47 @@ def evaluate(
     y: ArrayLike,
     *,
     accuracy: str = "double",
+    target: str | None = None,
+    with_bound: bool = False,
     clip: bool = False,
     bake: bool = False,
     portable: bool = False,
     backend: str = "native",
     cache: str | Path | None = None,
-) -> NDArray[Any]:
+) -> Any:
     """The intensity at points (x, y) of the image plane, in scene units; x and y broadcast, the result has their shape,
     and a last axis of 3 channels for a scene with colours.
 
     The plane passes through the point looked at, x to the right and y upwards. On the pixel centres of an image the
     values are those of `render_image`, bit for bit. Arguments as there, but `clip` is off by default.
+
+    with_bound    (values, bounds): of each value a float64 that its error does not exceed, proved; whatever the accuracy
+
     Raises ArgumentError for points that are not finite real numbers.
     """
     chosen = load_scene(scene)
     points_x, points_y = _points(x, y)
+    if with_bound:
+        values = evaluate(
+            chosen,
+            points_x,
+            points_y,
+            accuracy=accuracy,
+            target=target,
+            bake=bake,
+            portable=portable,
+            backend=backend,
+            cache=cache,
+        )
+        bounds = error_bounds(chosen, values, points_x, points_y, portable=portable, cache=cache)
+        return (np.clip(values, 0, 1) if clip and values.dtype.kind == "f" else values), bounds
     if backend == "numpy":
         return _numpy_backend(chosen.in_camera_frame(), points_x, points_y, accuracy, clip)
     _require_native(backend)
-    drawing = draw(chosen, accuracy, clip=clip, bake=bake, portable=portable, cache=cache)
+    job = job_of(chosen, accuracy, target, clip=clip, bake=bake, portable=portable, cache=cache)
+    if job is not None:
+        return settle_points(job, points_x, points_y).values
+    drawing = draw(chosen, drawn_as(chosen, accuracy), clip=clip, bake=bake, portable=portable, cache=cache)
     values = np.empty(drawing.shape(*points_x.shape), drawing.dtype)
     drawing.points(values, np.ascontiguousarray(points_x), np.ascontiguousarray(points_y))
     return np.array(_as_colour(values, shape_of(chosen, *points_x.shape)))
@@ -169,18 +233,14 @@ def _scene_indices(positions: NDArray[Any], plan: Plan) -> NDArray[Any]:
     return indices
 
 
-def _grid(width: int, height: int, pixel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    columns = (np.arange(width, dtype=np.float64) + 0.5 - 0.5 * width) * np.float64(pixel)
-    rows = (0.5 * height - 0.5 - np.arange(height, dtype=np.float64)) * np.float64(pixel)
-    return columns[np.newaxis, :], rows[:, np.newaxis]
-
-
 def _numpy_backend(
     frame: Scene, x: NDArray[np.float64], y: NDArray[np.float64], accuracy: str, clip: bool
 ) -> NDArray[Any]:
     from symrender_cg.lower.variants import variant
 
     chosen = variant(accuracy)
+    if chosen.settles:
+        raise ArgumentError(f"backend: 'numpy' proves nothing, and {accuracy!r} is proved; leave the backend out")
     dtype: DTypeLike = np.float32 if chosen.shading == "float32" else np.float64
     form: Literal["stable", "literal"] = "stable" if chosen.exact else "literal"
     if _is_one_sphere(frame):

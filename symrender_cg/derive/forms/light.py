@@ -115,6 +115,15 @@ def _mirrored_ray(program: ImageProgram) -> tuple[Definition, ...]:
     )
 
 
+def _complement(_: ImageProgram) -> tuple[Definition, ...]:
+    meaning = "1 - (r.v)^2 as a difference: cos2 is known far beyond float64"
+    return (Definition("sin2", 1 - S("cos2"), _SPECULAR, meaning),)
+
+
+def _complement_claims() -> tuple[Claim, ...]:
+    return (Claim(S("sin2"), 1 - S("r_dot_v") ** 2, given={"r_dot_v": sp.sqrt(S("cos2"))}, keep=("cos2",)),)
+
+
 def _mirror_claims() -> tuple[Claim, ...]:
     """Given l = w / |w|, n.v = facing / |D|; at last facing = -n.D and |n| = 1."""
     length, distance = sp.sqrt(S("inv_w2")), sp.sqrt(S("inv_d2"))
@@ -184,6 +193,14 @@ FORMS: tuple[Form, ...] = (
         "the growth of the error with the shininess: 1 - r.v is computed, not subtracted",
         "r.v = l.(D mirrored at n) / |D|; |a x b|^2 + (a.b)^2 = |a|^2 |b|^2",
         _mirror_claims,
+        brings=("specular",),
+    ),
+    Form(
+        "complement",
+        _complement,
+        "the nine products of w x mirror, where numbers are pairs",
+        "sin^2 + cos^2 = 1",
+        _complement_claims,
         brings=("specular",),
     ),
 )

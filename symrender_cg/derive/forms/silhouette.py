@@ -31,6 +31,8 @@ def _centred_span(_: ImageProgram) -> tuple[Definition, ...]:
         Definition("reach", sp.sqrt(rho2 - y**2), _SILHOUETTE, "the row's hits are -reach <= x <= reach"),
         Definition("x_left", -reach, _SILHOUETTE),
         Definition("x_right", reach, _SILHOUETTE),
+        Definition("extent_x", sp.sqrt(rho2), _SILHOUETTE, "no hit is farther from the axis, to the side or up"),
+        Definition("extent_y", sp.sqrt(rho2), _SILHOUETTE),
         *_facing(),
         Definition("s", x**2 + y**2, _RAY, "s = x^2 + y^2, A = |D|^2 = s + f^2"),
         Definition("d_dot_d", S("s") + focal**2, _RAY),
@@ -72,6 +74,18 @@ def _off_axis_span(_: ImageProgram) -> tuple[Definition, ...]:
         ),
         Definition("x_left", (row_mid - row_half) / alpha, _SILHOUETTE, "the row's hits are x_left <= x <= x_right"),
         Definition("x_right", (row_mid + row_half) / alpha, _SILHOUETTE),
+        Definition(
+            "height2", (S("distance") - radius) * (S("distance") + radius) / radius**2, _SILHOUETTE, "kappa^2 - 1"
+        ),
+        *(
+            Definition(
+                f"extent_{axis}",
+                focal * (depth * sp.Abs(offset) + sp.sqrt(S("height2") + offset**2)) / S("height2"),
+                _SILHOUETTE,
+                "no hit is farther from the axis, to the side or up" if axis == "x" else "",
+            )
+            for axis, offset in (("x", offset_x), ("y", offset_y))
+        ),
         *_facing(),
         Definition("s", x**2 + y**2, _RAY, "s = x^2 + y^2, A = |D|^2 = s + f^2"),
         Definition("d_dot_d", S("s") + focal**2, _RAY),

@@ -1,0 +1,252 @@
+"""Values that are proved, stage by stage, and the certificate that says so.
+
+    stage       what it is                                              takes
+    kernel      vectorised, with one bound for the frame                images of one sphere under one light
+    enclosure   every number a ball of double-doubles                   what the kernel left, and all other scenes
+    oracle      exact signs, Arb balls of growing precision             what the enclosure left
+
+Each stage settles what its bound can decide and hands on the rest. What the oracle leaves is an error that names the
+pixels. Never done here: a value that is not proved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrender_cg.errors import AccuracyError
+from symrender_cg.lower.variants import Variant
+from symrender_cg.pipeline import enclosure_kernel, pixel_size, settling_kernel
+from symrender_cg.run.grid import pixel_centres
+from symrender_cg.run.numbers import numbers_of
+from symrender_cg.run.settling import settled
+from symrender_cg.run.settling_kernel import SettlingKernel
+from symrender_cg.run.threads import over_rows, thread_count
+from symrender_cg.scene import Scene
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+
+class Stage(NamedTuple):
+    """How many points a stage settled, and the largest bound of the error of a value that it settled.
+
+    The bound is on the stage's own number, before rounding; that of the oracle is 0: it rounds the true value.
+    """
+
+    name: str
+    settled: int
+    bound: float
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What was proved: `claim` holds for every one of `points` pixels or points, each settled by one of the stages."""
+
+    claim: str
+    points: int
+    stages: tuple[Stage, ...]
+
+    @property
+    def bound(self) -> float:
+        """The largest bound of any stage that settled something."""
+        return max((stage.bound for stage in self.stages if stage.settled), default=0.0)
+
+    def __str__(self) -> str:
+        words = [f"{stage.name} {stage.settled:,} (error at most {stage.bound:.1e})" for stage in self.stages]
+        return f"{self.claim} at all {self.points:,}: {', '.join(words)}"
+
+
+class Certified(NamedTuple):
+    """An image or values at points, and the proof."""
+
+    values: NDArray[Any]
+    certificate: Certificate
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is to be settled, by which rule, and how."""
+
+    scene: Scene
+    variant: Variant
+    clip: bool
+    portable: bool = False
+    cache: str | Path | None = None
+    threads: int | None = None
+
+    @property
+    def white(self) -> float:
+        """The intensity above which white is written."""
+        return 1.0 if self.clip else float(np.inf)
+
+    @property
+    def rule(self) -> str:
+        """See symrender_cg.run.settling."""
+        assert self.variant.settles is not None, f"{self.variant.name} settles nothing"
+        return self.variant.settles
+
+    @property
+    def claim(self) -> str:
+        """What is proved, in words."""
+        return {
+            "ulp": "within 4 ulp",
+            "float64": "the nearest float64",
+            "float32": "the nearest float32",
+            "uint8": "the right grey level",
+        }[self.rule]
+
+
+class _Points(Protocol):
+    """The points that are asked for, in an order."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    def at(self, places: Places) -> tuple[Floats, Floats]: ...
+
+    def name(self, place: int) -> str: ...
+
+    def settle(self, job: Job, kernel: SettlingKernel, numbers: Any) -> tuple[NDArray[Any], Places, float]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class _Image:
+    shape: tuple[int, int]
+    pixel: float
+
+    def at(self, places: Places) -> tuple[Floats, Floats]:
+        height, width = self.shape
+        columns, rows = pixel_centres(width, height, self.pixel)
+        return columns[places % width], rows[places // width]
+
+    def name(self, place: int) -> str:
+        return f"column {place % self.shape[1]}, row {place // self.shape[1]}"
+
+    def settle(self, job: Job, kernel: SettlingKernel, numbers: Any) -> tuple[NDArray[Any], Places, float]:
+        """The image, the pixels that are left over, and the kernel's bound."""
+        height, width = self.shape
+        image = np.empty(self.shape, dtype=kernel.dtype)
+        left_over: list[Places] = []
+
+        def some(begin: int, end: int) -> None:
+            left_over.append(
+                kernel.settle_rows(image, numbers, pixel=self.pixel, white=job.white, begin=begin, end=end)
+            )
+
+        over_rows(some, height, thread_count(job.threads, width * height))
+        bound = kernel.bound(numbers, width=width, height=height, pixel=self.pixel)
+        return image, np.sort(np.concatenate(left_over)), bound
+
+
+@dataclass(frozen=True, eq=False)
+class _Cloud:
+    shape: tuple[int, ...]
+    x: Floats
+    y: Floats
+
+    def at(self, places: Places) -> tuple[Floats, Floats]:
+        return self.x[places], self.y[places]
+
+    def name(self, place: int) -> str:
+        return f"({float(self.x[place])!r}, {float(self.y[place])!r})"
+
+    def settle(self, job: Job, kernel: SettlingKernel, numbers: Any) -> tuple[NDArray[Any], Places, float]:
+        """The values, the points that are left over, and a bound for the square that holds all points."""
+        values = np.empty(self.x.size, dtype=kernel.dtype)
+        left_over = kernel.settle_points(values, self.x, self.y, numbers, white=job.white)
+        side = 2.0 * float(max(np.abs(self.x).max(), np.abs(self.y).max())) if values.size else 0.0
+        return values, left_over, kernel.bound(numbers, width=1, height=1, pixel=side)
+
+
+def settle_image(job: Job, width: int, height: int) -> Certified:
+    """Every pixel of an image by the job's rule; shape (height, width), or (height, width, 3) for a scene with colours.
+
+    Raises AccuracyError naming the pixels that even the oracle leaves open.
+    """
+    return _settled(job, lambda frame: _Image((height, width), pixel_size(frame, height)), width / height)
+
+
+def settle_points(job: Job, x: Floats, y: Floats) -> Certified:
+    """The same for points of the image plane; x and y of one shape, which is that of the values."""
+    columns, rows = (np.ascontiguousarray(a, dtype=np.float64).reshape(-1) for a in (x, y))
+    return _settled(job, lambda _: _Cloud(x.shape, columns, rows), None)
+
+
+def _settled(job: Job, points_of: Callable[[Scene], _Points], aspect: float | None) -> Certified:
+    channels = _channels(job.scene)
+    first = settling_kernel(job.scene, job.variant, aspect=aspect, portable=job.portable, cache=job.cache)
+    stages: list[Stage] = []
+    if first is None:
+        points = points_of(job.scene.in_camera_frame())
+        count = math.prod(points.shape)
+        values, places = np.empty((count, channels), dtype=job.variant.result), np.arange(count)
+    else:
+        kernel, frame = first
+        points = points_of(frame)
+        count = math.prod(points.shape)
+        found, places, bound = points.settle(job, kernel, _numbers(kernel, frame))
+        values = found.reshape(count, 1)
+        stages.append(Stage("kernel", count - places.size, bound))
+        if channels == 3:
+            values = np.repeat(values, 3, axis=1)
+    for name, stage in (("enclosure", _enclosed), ("oracle", _asked)):
+        if not places.size:
+            break
+        rounded, is_settled, bound = stage(job, points, places)
+        values[places] = rounded.reshape(places.size, -1)
+        stages.append(Stage(name, int(is_settled.sum()), bound))
+        places = places[~is_settled]
+    shape = points.shape if channels == 1 else (*points.shape, channels)
+    return Certified(values.reshape(shape), Certificate(job.claim, count, tuple(stages)))
+
+
+@lru_cache(maxsize=64)
+def _channels(scene: Scene) -> int:
+    return scene.channels
+
+
+@lru_cache(maxsize=64)
+def _numbers(kernel: SettlingKernel, frame: Scene) -> Any:
+    """The scene as the kernel takes it, remembered: a scene is drawn more than once."""
+    return kernel.numbers(numbers_of(frame))
+
+
+def _enclosed(job: Job, points: _Points, places: Places) -> tuple[NDArray[Any], NDArray[np.bool_], float]:
+    """Values at places, which of them are settled, and the largest error of those: by the enclosure kernel."""
+    kernel = enclosure_kernel(job.scene, portable=job.portable, cache=job.cache)
+    found = kernel.enclose(*points.at(places), threads=job.threads)
+    rounded, is_settled = settled(found, job.rule)
+    whole = np.asarray(is_settled.reshape(places.size, -1).all(axis=1), dtype=np.bool_)
+    errors = found.error.reshape(places.size, -1)[whole]
+    return _cut(job, rounded), whole, float(errors.max(initial=0.0))
+
+
+def _asked(job: Job, points: _Points, places: Places) -> tuple[NDArray[Any], NDArray[np.bool_], float]:
+    """The same by the oracle, which leaves nothing, or raises AccuracyError."""
+    from symrender_cg.reference import oracle
+
+    target = job.rule if job.rule in oracle.TARGETS else "float64"
+    try:
+        rounded = oracle.settle(job.scene, *points.at(places), target)
+    except AccuracyError as open_points:
+        left = [int(places[k]) for k in open_points.points]
+        shown = "; ".join(points.name(place) for place in left[:8]) + ("; ..." if len(left) > 8 else "")
+        raise AccuracyError(
+            f"{job.variant.name}: {len(left)} of {math.prod(points.shape)} values are not settled: {shown}; each "
+            "rests on a tie that neither balls nor exact numbers decide; move the scene or the camera by one float",
+            left,
+        ) from None
+    return _cut(job, rounded), np.ones(places.size, dtype=bool), 0.0
+
+
+def _cut(job: Job, values: NDArray[Any]) -> NDArray[Any]:
+    """To [0, 1] where the image is clipped; rounding and cutting change places freely."""
+    return np.clip(values, 0, 1) if job.clip and values.dtype.kind == "f" else values

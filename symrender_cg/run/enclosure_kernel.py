@@ -1,0 +1,104 @@
+"""`EnclosureKernel`: the native kernel that encloses a scene's intensities, called with numpy arrays.
+
+Comes in: a plan with an arrangement, points of the image plane. Goes out: Enclosure, hi, lo and error with
+|true intensity - (hi + lo)| <= error. Never done here: a bound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symrender_cg.build.library import CachedKernel, Library
+from symrender_cg.plan.plan import Plan
+from symrender_cg.run.enclosure_numbers import exact_numbers
+from symrender_cg.run.scene_numbers import scene_numbers
+from symrender_cg.run.threads import over_rows, thread_count
+
+_CHUNK: Final = 1024
+"""Points that a thread takes at a time, each time with tables of its own."""
+
+_AS_PIXELS: Final = 64
+"""A point takes as long as so many pixels of an image: by that the number of threads is chosen."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Enclosure:
+    """|true intensity - (hi + lo)| <= error, for each point and channel.
+
+    float64, shape of the points, with a last axis of 3 for a scene with colours. hi is the float64 nearest to hi + lo.
+    error is inf, and hi and lo are 0, where nothing is known.
+    """
+
+    hi: NDArray[np.float64]
+    lo: NDArray[np.float64]
+    error: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnclosureKernel:
+    """A native enclosure bound to a scene.
+
+    name      its C name; the entry point is name_points
+    fields    (name, shape) of its scene structure's fields
+    channels  1 or 3
+    plan      of the scene that is enclosed
+    nearer    its lights were brought nearer along their directions, see enclosure_numbers.brought_nearer
+    """
+
+    name: str
+    fields: tuple[tuple[str, str], ...]
+    channels: int
+    plan: Plan
+    cached: CachedKernel
+    library: Library
+    nearer: bool = False
+
+    def enclose(self, x: ArrayLike, y: ArrayLike, *, threads: int | None = None) -> Enclosure:
+        """The intensities at points of the image plane; x and y broadcast. Releases the GIL.
+
+        Raises MemoryError.
+        """
+        given_x, given_y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        columns, rows = np.ascontiguousarray(given_x).reshape(-1), np.ascontiguousarray(given_y).reshape(-1)
+        count = columns.size
+        hi, lo, error = (np.empty((count, self.channels)) for _ in range(3))
+        scene, keeps = self._scene()
+        entry = getattr(self.library.lib, f"{self.name}_points")
+        as_pointer = self.library.ffi.cast
+
+        def some(begin: int, end: int) -> None:
+            first, last = begin * _CHUNK, min(end * _CHUNK, count)
+            pointers = [as_pointer("double *", a[first:last].ctypes.data) for a in (hi, lo, error, columns, rows)]
+            if entry(*pointers, last - first, scene):
+                raise MemoryError(f"no memory for the tables of a scene of {len(keeps)} arrays")
+
+        if count:
+            over_rows(some, -(-count // _CHUNK), thread_count(threads, _AS_PIXELS * count))
+        shape = given_x.shape if self.channels == 1 else (*given_x.shape, self.channels)
+        return Enclosure(hi.reshape(shape), lo.reshape(shape), error.reshape(shape))
+
+    def numbers(self) -> dict[str, Any]:
+        """The scene as the kernel takes it: numbers and arrays by the names of its fields."""
+        found = self.plan.arrangement
+        assert found is not None, "an enclosure is for plans with an arrangement"
+        frame = self.plan.scene
+        return scene_numbers(frame, found, self.channels) | exact_numbers(frame, nearer=self.nearer)
+
+    def _scene(self) -> tuple[Any, tuple[Any, ...]]:
+        """The scene as C sees it, and the arrays that it refers to."""
+        ffi, numbers = self.library.ffi, self.numbers()
+        scene = ffi.new(f"{self.name}_scene *")
+        keeps: list[Any] = []
+        for name, shape in self.fields:
+            value = numbers[name]
+            if shape in ("reals", "wholes"):
+                array = np.ascontiguousarray(value, dtype=np.float64 if shape == "reals" else np.int32)
+                keeps.append(array)
+                setattr(scene, name, ffi.cast("double *" if shape == "reals" else "int *", array.ctypes.data))
+            else:
+                setattr(scene, name, value)
+        return scene, tuple(keeps)
