@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 
 import benchmarks
-from benchmarks import agreement, random_scenes, scaling, scenes, speed, start
+from benchmarks import agreement, levels, random_scenes, scaling, scenes, speed, start
 from symrender_cg.errors import SymrenderError
 
 
@@ -33,7 +33,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-Report = speed.Report | start.Report | agreement.Report | scaling.Report | random_scenes.Report | scenes.Report
+Report = (
+    speed.Report
+    | start.Report
+    | agreement.Report
+    | scaling.Report
+    | random_scenes.Report
+    | scenes.Report
+    | levels.Report
+)
 
 
 def _measured(options: argparse.Namespace, told: Callable[[str], None]) -> Report:
@@ -47,6 +55,9 @@ def _measured(options: argparse.Namespace, told: Callable[[str], None]) -> Repor
         return random_scenes.measure_random_scenes(options.count, options.seed, size, options.jobs, told)
     if options.command == "scenes":
         return scenes.measure_scenes(options.scenes, options.size, options.rounds, options.seed, told)
+    if options.command == "levels":
+        size, rounds, seed = options.size, options.rounds, options.seed
+        return levels.measure_levels(options.scenes, size, rounds, options.points, seed, told)
     if options.command == "scaling":
         counts = options.counts or (scaling.QUICK_COUNTS if options.quick else scaling.COUNTS)
         rounds = options.rounds or (3 if options.quick else 9)
@@ -83,12 +94,17 @@ def _parser() -> argparse.ArgumentParser:
     effects.add_argument("scenes", nargs="*", help="built-in names or TOML files (all built-in scenes)")
     effects.add_argument("--size", type=_count, default=512, help="side of the image (512)")
     effects.add_argument("--rounds", type=_count, default=9, help="samples of each time (9)")
+    costs = commands.add_parser("levels", help="what each accuracy costs and delivers, scene by scene")
+    costs.add_argument("scenes", nargs="*", help="built-in names or TOML files (all built-in scenes)")
+    costs.add_argument("--size", type=_count, default=256, help="side of the image (256)")
+    costs.add_argument("--rounds", type=_count, default=9, help="samples of each time (9)")
+    costs.add_argument("--points", type=_count, default=2000, help="most pixels to compare with the oracle (2000)")
     truth = commands.add_parser("random-scenes", help="random scenes against brute force and the oracle; minutes")
     truth.add_argument("--count", type=_count, default=2000, help="how many scenes (2000)")
     truth.add_argument("--width", type=_count, default=24, help="pixels of a row (24)")
     truth.add_argument("--height", type=_count, default=20, help="rows of an image (20)")
     truth.add_argument("--jobs", type=_count, help="processes (one for each processor)")
-    for command in (fast, first, peers, many, effects, truth):
+    for command in (fast, first, peers, many, effects, costs, truth):
         command.add_argument("--seed", type=int, default=1, help="seed of the order of turns and of the pixels (1)")
         command.add_argument("--json", action="store_true", help="print JSON, not tables")
     return parser

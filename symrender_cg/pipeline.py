@@ -38,7 +38,7 @@ from symrender_cg.errors import ArgumentError, OutsidePlanError
 from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.plan.plan import Plan, plan, require_format
 from symrender_cg.resources import templates
-from symrender_cg.run.drawing import Drawing, bind
+from symrender_cg.run.drawing import Drawing, SamePlan, bind
 from symrender_cg.run.enclosure_kernel import EnclosureKernel
 from symrender_cg.run.enclosure_numbers import brought_nearer
 from symrender_cg.run.kernel import Kernel
@@ -340,7 +340,13 @@ def enclosure_kernel(scene: Scene, *, portable: bool = False, cache: str | Path 
         kernel = _enclosures.get(key)
         if kernel is None:
             kernel = _enclosures[key] = _enclosure(found, portable=portable, root=root)
-    return replace(kernel, plan=found, nearer=nearer is not None)
+    return _enclosing(kernel, SamePlan(found), nearer is not None)
+
+
+@lru_cache(maxsize=8)
+def _enclosing(kernel: EnclosureKernel, same: SamePlan, nearer: bool) -> EnclosureKernel:
+    """The kernel bound to a scene, remembered with the scene's tables."""
+    return replace(kernel, plan=same.plan, nearer=nearer)
 
 
 _enclosures: dict[tuple[Any, ...], EnclosureKernel] = {}

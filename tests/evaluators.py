@@ -64,8 +64,6 @@ EVALUATORS: tuple[Evaluator, ...] = (
     Evaluator("double", lambda s, x, y: evaluate(s, x, y, accuracy="double"), exact=True),
     Evaluator("single", lambda s, x, y: evaluate(s, x, y, accuracy="single"), np.float32, exact=True),
     Evaluator("fast", lambda s, x, y: evaluate(s, x, y, accuracy="fast"), np.float32, exact=True),
-    Evaluator("stable", lambda s, x, y: evaluate(s, x, y, accuracy="stable"), exact=True),
-    Evaluator("certified", lambda s, x, y: evaluate(s, x, y, accuracy="certified"), exact=True),
     Evaluator("baked", lambda s, x, y: evaluate(s, x, y, accuracy="double", bake=True), exact=True),
 )
 

@@ -1,4 +1,4 @@
-"""Certified and stable values: the oracle's own rounding at every pixel, certificates that add up, errors that name pixels."""
+"""Certified and stable values: the oracle's own rounding everywhere, certificates that add up, errors naming pixels."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scene_strategies import random_scene, scene_points
 from symrender_cg import certify, evaluate, render_image
 from symrender_cg.errors import AccuracyError, ArgumentError, OutsidePlanError
 from symrender_cg.lower.variants import TARGETS
-from symrender_cg.pipeline import pixel_size
+from symrender_cg.pipeline import pixel_size, planned
 from symrender_cg.reference import oracle
 from symrender_cg.run import certify as stages
 from symrender_cg.run.certify import Certificate, Stage
@@ -32,6 +32,8 @@ from symrender_cg.stress.families import FAMILIES
 SIDE = 32
 CASES = 100 if THOROUGH else 6
 SEEDS = range(300 if THOROUGH else 5)
+PLANS = {"centred_sphere", "centred_sphere_gated", "any_sphere"}
+"""Plans of which all cases are looked at; of others the first of a family, unless thorough: each costs kernels."""
 RULES = {"float64": np.float64, "float32": np.float32, "uint8": np.uint8}
 
 
@@ -123,6 +125,8 @@ def test_hard_points_are_rounded_as_the_oracle_rounds_them(family: Any) -> None:
         x, y = x[finite], y[finite]
         few = (*TARGETS, "stable") if THOROUGH or case.number < 2 else ("float64", "stable")
         try:
+            if case.number > 0 and not THOROUGH and planned(case.scene).name not in PLANS:
+                continue
             true = oracle.evaluate(case.scene, x, y)
             found = {target: values_of(case.scene, x, y, target) for target in few}
         except (AccuracyError, OutsidePlanError):
@@ -131,7 +135,7 @@ def test_hard_points_are_rounded_as_the_oracle_rounds_them(family: Any) -> None:
         answers = {"float64": true.value, "float32": true.value32, "uint8": true.value8}
         for target in few:
             if target != "stable":
-                assert same_bits(found[target], answers[target]), f"{case.name} {target}: {found[target]}"
+                assert same_bits(found[target], np.asarray(answers[target])), f"{case.name} {target}: {found[target]}"
 
 
 def values_of(scene: Scene, x: Any, y: Any, target: str) -> npt.NDArray[Any]:
@@ -329,7 +333,7 @@ def test_many_open_pixels_are_shown_by_the_first_eight(monkeypatch: pytest.Monke
 
 
 def test_what_the_enclosure_leaves_over_the_oracle_settles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Were the enclosure's bounds infinite, the values would be the same, and the certificate would say whose they are."""
+    """Were the enclosure's bounds infinite, the values would be the same, and the certificate would say whose."""
 
     def nothing(found: Enclosure, rule: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
         return settled(found, rule)[0], np.zeros(found.hi.shape, dtype=bool)

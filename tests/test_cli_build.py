@@ -11,15 +11,19 @@ from pathlib import Path
 import pytest
 import sympy as sp
 from command_line import LOADED_AFTER, Shell, in_a_process
+from evaluators import PROVED
 
 from symrender_cg import Scene, generate, pipeline, statistics
 from symrender_cg.build.toolchain import find_toolchain
 from symrender_cg.cli.main import main
+from symrender_cg.errors import ArgumentError
 from symrender_cg.explain import swollen_operations
 from symrender_cg.explain.operations import swell_of
 from symrender_cg.plan.plan import plan
 
-LEVELS = ("literal", "single", "double")
+ONE_KERNEL = ("literal", "single", "double")
+KERNELS = ("fast", *ONE_KERNEL, "stable", "certified_float64")
+"""What accuracy `all` is of one sphere."""
 
 
 @pytest.fixture
@@ -50,17 +54,17 @@ def test_a_first_build_prints_stages_swell_files_command_and_library(
     folder = tmp_path / "c"
     answer = shell("build", "--out", folder)
     assert answer.code == 0
-    for level in LEVELS:
+    for level in KERNELS:
         name = f"centred_sphere_{level}"
         assert f"\n{name}\n" in f"\n{answer.out}"
         for kind in (f"{name}.c", f"{name}.h", "manifest.json"):
             assert (folder / name / kind).is_file()
             assert f"  new        {name}/{kind}\n" in answer.out
     for stage in ("plan", "derive", "lower", "emit", "build"):
-        assert sum(line.startswith(f"  {stage} ") for line in answer.out.splitlines()) == 3
-    assert answer.out.count("\ncommand  ") == 3
+        assert sum(line.startswith(f"  {stage} ") for line in answer.out.splitlines()) == len(KERNELS)
+    assert answer.out.count("\ncommand  ") == len(KERNELS)
     libraries = re.findall(r"^library  (\S+) \(compiled in", answer.out, re.M)
-    assert len(libraries) == 3
+    assert len(libraries) == len(KERNELS)
     assert all(Path(library).is_file() and empty_cache in Path(library).parents for library in libraries)
 
 
@@ -97,7 +101,7 @@ def test_a_second_build_does_nothing_and_says_so(shell: Shell, tmp_path: Path) -
     assert answer.out.startswith("nothing had to be done: ")
     assert (statistics.derived, statistics.compiled) == before
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == stamps
-    assert len(re.findall(r"^library  \S+ \(from the cache\)$", answer.out, re.M)) == 3
+    assert len(re.findall(r"^library  \S+ \(from the cache\)$", answer.out, re.M)) == len(KERNELS)
 
 
 def test_a_second_build_loads_no_sympy_no_templates_and_no_rich(tmp_path: Path) -> None:
@@ -337,7 +341,9 @@ def test_all_of_a_scene_leaves_the_formula_of_one_sphere_out(shell: Shell, tmp_p
     answer = shell("build", "two_spheres", "--out", tmp_path)
     assert answer.code == 0
     assert answer.err.startswith("symrender_cg: literal is left out: ")
-    assert {path.name for path in tmp_path.iterdir()} == {"scene_single", "scene_double", "support"}
+    scenes = {f"scene_{kernel}" for kernel in ("fast", "single", "double", "enclosure")}
+    assert {path.name for path in tmp_path.iterdir()} == scenes | {"support"}
+    assert answer.out.count("\ncommand  ") == 4
 
 
 def test_baking_a_scene_is_refused_as_usage(shell: Shell, tmp_path: Path) -> None:
@@ -346,3 +352,110 @@ def test_baking_a_scene_is_refused_as_usage(shell: Shell, tmp_path: Path) -> Non
         assert answer.code == 2
         assert "leave bake out" in answer.err
     assert not list(tmp_path.iterdir())
+
+
+# --------------------------------------------------------------------------------------- levels that prove their values
+
+
+@pytest.mark.parametrize(("accuracy", "target"), PROVED)
+def test_a_level_that_proves_its_values_is_built_with_the_command_that_makes_it_again(
+    shell: Shell, tmp_path: Path, accuracy: str, target: str | None
+) -> None:
+    rounding = () if target is None else ("--target", target)
+    answer = shell("build", "--accuracy", accuracy, *rounding, "--out", tmp_path)
+    assert answer.code == 0
+    translation = pipeline.translate(Scene.chapter1(), accuracy, target=target)
+    name = translation.emitted.name
+    assert name == "centred_sphere_" + "_".join(filter(None, (accuracy, target)))
+    manifest = json.loads((tmp_path / name / "manifest.json").read_text())
+    assert manifest["command"] == " ".join(("python -m symrender_cg build chapter1 --accuracy", accuracy, *rounding))
+    assert manifest["accuracy"] == translation.variant.name
+    assert manifest["result_type"] == {"float32": "float", "uint8": "unsigned char"}.get(target or "", "double")
+    text = (tmp_path / name / f"{name}.c").read_text()
+    assert f"Regenerate with:\n *     {manifest['command']}\n" in text
+    assert {"support/range.h", "support/settle.h"} <= set(manifest["support"])
+    again = shell(*shlex.split(manifest["command"])[3:], "--out", tmp_path)
+    assert again.out.startswith(f"nothing had to be done: {name} up to date")
+
+
+def test_certified_without_a_target_is_float64_also_in_its_command(shell: Shell, tmp_path: Path) -> None:
+    assert shell("build", "--accuracy", "certified", "--out", tmp_path).code == 0
+    manifest = json.loads((tmp_path / "centred_sphere_certified_float64" / "manifest.json").read_text())
+    assert manifest["command"] == "python -m symrender_cg build chapter1 --accuracy certified"
+
+
+def test_every_level_of_a_scene_that_proves_its_values_rests_on_one_enclosure(shell: Shell, tmp_path: Path) -> None:
+    for place, words in (
+        ("a", ("--accuracy", "stable")),
+        ("b", ("--accuracy", "certified", "--target", "uint8")),
+        ("c", ("--accuracy", "stable,certified", "--passes")),
+    ):
+        answer = shell("build", "two_spheres", *words, "--out", tmp_path / place)
+        assert answer.code == 0
+        assert answer.out.count("library  ") == 1
+    assert contents(tmp_path / "a") == contents(tmp_path / "b") == contents(tmp_path / "c")
+    manifest = json.loads((tmp_path / "a" / "scene_enclosure" / "manifest.json").read_text())
+    assert (manifest["accuracy"], manifest["promise"]) == ("enclosure", generate.ENCLOSES)
+    assert manifest["command"] == "python -m symrender_cg build two_spheres --accuracy certified"
+    assert [field["name"] for field in manifest["fields"]] == manifest["inputs"]
+    assert set(manifest["parts"]) == set(pipeline.translate(Scene.builtin("two_spheres"), "stable").parts)
+    assert (tmp_path / "a" / "support" / "ball.h").is_file()
+
+
+def test_the_swell_meter_of_a_scene_has_the_parts_of_values_and_of_enclosures(shell: Shell, tmp_path: Path) -> None:
+    answer = shell("build", "two_spheres", "--accuracy", "double,stable", "--passes", "--out", tmp_path)
+    swell = answer.out[answer.out.index("swell meter") :]
+    found = {level: pipeline.translate(Scene.builtin("two_spheres"), level).programs for level in ("double", "stable")}
+    for part in dict.fromkeys((*found["double"], *found["stable"])):
+        words = {"double": "double", "stable": "enclosure"}
+        inside = [
+            f"{words[level]} {sum(programs[part].operations().values())}"
+            for level, programs in found.items()
+            if part in programs
+        ]
+        assert cells(swell, f"{part} ")[-1] == ", ".join(inside)
+    assert set(found["double"]) - set(found["stable"]) == {"span"}
+    assert set(found["stable"]) - set(found["double"]) == {"near"}
+
+
+def test_a_build_serves_certify_without_another_compilation(shell: Shell, tmp_path: Path, empty_cache: Path) -> None:
+    assert shell("build", "two_spheres", "--accuracy", "stable", "--out", tmp_path / "c").code == 0
+    words = ("two_spheres", "-o", tmp_path / "a.npy", "--size", "8x8", "--accuracy", "certified")
+    assert "scene_enclosure from the cache, " in in_a_process("render", *words).out
+    assert len(list(empty_cache.glob("kernels/*"))) == 1
+
+
+def test_an_enclosure_compiles_by_hand_under_strict_c99(shell: Shell, tmp_path: Path) -> None:
+    assert shell("build", "lights", "--accuracy", "stable", "--out", tmp_path).code == 0
+    (kernel,) = tmp_path.glob("*_enclosure")
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"]
+    command = [*find_toolchain().command, *flags, f"-I{kernel}", f"-I{tmp_path / 'support'}"]
+    done = subprocess.run([*command, str(kernel / f"{kernel.name}.c")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--target", "uint8", "--accuracy", "double"), "--target uint8: this is what accuracy certified rounds to"),
+        (("--accuracy", "stable", "--bake"), "a kernel of 'stable' takes its numbers as arguments; leave bake out"),
+    ],
+)
+def test_what_no_kernel_is_made_of_is_refused(shell: Shell, tmp_path: Path, words: tuple[str, ...], text: str) -> None:
+    answer = shell("build", *words, "--out", tmp_path)
+    assert answer.code == 2
+    assert text in answer.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_baking_all_bakes_what_one_kernel_draws_alone(shell: Shell, tmp_path: Path) -> None:
+    assert shell("build", "--bake", "--out", tmp_path).code == 0
+    baked = {f"centred_sphere_{level}_baked" for level in ("fast", *ONE_KERNEL)}
+    assert {path.name for path in tmp_path.iterdir()} == baked | {"support"}
+
+
+def test_no_kernel_alone_draws_a_level_of_stages() -> None:
+    for scene in (Scene.chapter1(), Scene.builtin("two_spheres")):
+        for accuracy in ("stable", "certified"):
+            with pytest.raises(ArgumentError, match="in stages; expected a level that one kernel draws alone"):
+                pipeline.draw(scene, accuracy)

@@ -13,12 +13,16 @@ from msgspec import structs
 
 from symrender_cg import Camera, Phong, PointLight, Scene, Sphere, evaluate, pipeline
 from symrender_cg.errors import AccuracyError
+from symrender_cg.lower.variants import ACCURACIES
 from symrender_cg.reference import brute_force, check_scene, compare, oracle, points
 from symrender_cg.reference import check as module
 from symrender_cg.reference.check import check, stated_bound
-from symrender_cg.reference.check_rows import Report, Row
+from symrender_cg.reference.check_rows import STATED_ULP, Report, Row
+from symrender_cg.run import render
 from symrender_cg.run.kernel import Kernel
+from symrender_cg.run.levels import hands_over
 from symrender_cg.run.scene_kernel import SceneKernel
+from symrender_cg.run.settling_kernel import SettlingKernel
 
 FEW = ("--size", "24x24", "--points", "60")
 
@@ -30,11 +34,15 @@ def shell(capsys: pytest.CaptureFixture[str]) -> Shell:
 
 @pytest.mark.parametrize("scene", Scene.builtin_names())
 def test_stated_bounds_hold_on_every_built_in_scene(scene: str) -> None:
-    report = check(Scene.builtin(scene), width=32, height=32, count=200)
+    report = check(Scene.builtin(scene), width=24, height=24, count=120)
     report.require()
-    exact = [row for row in report.rows if row.accuracy in ("single", "double")]
-    assert len(exact) >= 6
+    exact = [row for row in report.rows if row.accuracy in ("fast", "single", "double")]
+    assert len(exact) >= 9
     assert all(row.bound is not None and row.wrong_hits == 0 for row in exact)
+    for level, ulp in STATED_ULP.items():
+        proved = [row for row in report.rows if row.accuracy == level]
+        assert len(proved) >= 3
+        assert all(row.max_ulp <= ulp == row.bound_ulp and (row.wrong_hits, row.in_doubt) == (0, 0) for row in proved)
     # near the places alone that are looked for may a decision be within rounding, and not at most of them
     assert all(row.in_doubt < (1 if row.where.startswith("image") else row.count // 2) for row in exact)
 
@@ -43,11 +51,13 @@ def test_the_table_has_a_row_for_each_evaluator_and_set_of_points(shell: Shell) 
     answer = shell("check", *FEW)
     assert answer.code == 0
     rows = [line for line in answer.out.splitlines() if line.startswith(("kernel", "numpy", "per pixel"))]
-    for evaluator in ("kernel literal", "kernel single", "kernel double", "numpy stable", "numpy literal", "per pixel"):
+    for evaluator in (*(f"kernel {name}" for name in ACCURACIES), "numpy stable", "numpy literal", "per pixel"):
         for where in ("image 24x24", "near silhouette", "near terminator", "near highlight"):
             assert sum(row.startswith(evaluator) and where in row for row in rows) == 1
-    assert len(rows) == 24
-    assert sum(row.endswith("holds") for row in rows) == 8
+    assert len(rows) == 36
+    assert sum(row.endswith("holds") for row in rows) == 20
+    assert sum(row.endswith("  4 ulp  holds") for row in rows) == 4
+    assert sum(row.endswith("0.5 ulp  holds") for row in rows) == 4
     assert "576 (image 24x24), 60 (near silhouette)" in answer.out
 
 
@@ -73,13 +83,13 @@ def test_wrong_hits_are_seen_where_hit_and_miss_look_alike() -> None:
     assert wrong["numpy stable", "near silhouette"] == 0
 
 
-def _spoiled(monkeypatch: pytest.MonkeyPatch, spoil: Any) -> None:
-    """Lets every double kernel give other values than it computes."""
+def _spoiled(monkeypatch: pytest.MonkeyPatch, spoil: Any, level: str = "double") -> None:
+    """Lets every kernel of a level give other values than it computes."""
     honest = Kernel.points
 
     def points_of(self: Kernel, values: Any, *arguments: Any, **options: Any) -> None:
         honest(self, values, *arguments, **options)
-        if self.dtype == np.float64 and self.name.endswith("double"):
+        if self.name.endswith(f"_{level}"):
             spoil(values)
 
     monkeypatch.setattr(Kernel, "points", points_of)
@@ -125,7 +135,7 @@ def test_points_in_doubt_are_those_at_the_jump_of_a_gated_scene_alone() -> None:
     (sphere,) = gated.spheres
     plain = structs.replace(sphere, material=structs.replace(sphere.material, gate_specular=False))
     for scene in (gated, structs.replace(gated, spheres=(plain,))):
-        report = check(scene, width=16, height=16, count=200, accuracies=("double",))
+        report = check(scene, width=16, height=16, count=200, accuracies=("single",))
         report.require()
         doubt = {row.where: row.in_doubt for row in report.rows if row.accuracy}
         assert doubt["image 16x16"] == doubt["near silhouette"] == doubt["near highlight"] == 0
@@ -135,12 +145,110 @@ def test_points_in_doubt_are_those_at_the_jump_of_a_gated_scene_alone() -> None:
 
 def test_a_wrong_value_away_from_the_terminator_is_no_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
     def spoil(values: Any) -> None:
-        values[values > 0.2] += 1e-12
+        values[values > 0.2] += np.float32(1e-3)
 
-    _spoiled(monkeypatch, spoil)
-    report = check(Scene.builtin("grazing_light"), width=16, height=16, count=100, accuracies=("double",))
-    with pytest.raises(AccuracyError, match="kernel double, image 16x16"):
+    _spoiled(monkeypatch, spoil, "single")
+    report = check(Scene.builtin("grazing_light"), width=16, height=16, count=100, accuracies=("single",))
+    with pytest.raises(AccuracyError, match="kernel single, image 16x16"):
         report.require()
+
+
+def test_double_that_is_handed_over_states_what_stable_does_and_has_no_doubts() -> None:
+    scene = Scene.builtin("grazing_light")
+    assert hands_over(scene)
+    report = check(scene, width=16, height=16, count=200, accuracies=("double",))
+    report.require()
+    rows = [row for row in report.rows if row.accuracy]
+    assert len(rows) == 4
+    assert all(row.bound_ulp == 4.0 >= row.max_ulp and row.bound is not None and row.in_doubt == 0 for row in rows)
+
+
+# --------------------------------------------------------------------------------------- levels that prove their values
+
+
+def _other_values(monkeypatch: pytest.MonkeyPatch, level: str, spoil: Any) -> None:
+    """Lets a level give other values than it proves."""
+    honest = render.evaluate
+
+    def evaluate_wrongly(*arguments: Any, **options: Any) -> Any:
+        values = honest(*arguments, **options)
+        return spoil(values) if options.get("accuracy") == level else values
+
+    for place in (render, check_scene):
+        monkeypatch.setattr(place, "evaluate", evaluate_wrongly)
+
+
+def _ulps_up(count: int) -> Any:
+    return lambda values: values + count * np.spacing(np.abs(values)) * (values > 0.25)
+
+
+@pytest.mark.parametrize("scene", ["chapter1", "two_spheres"])
+@pytest.mark.parametrize(("level", "ulps"), [("stable", 5), ("certified", 1)])
+def test_a_level_that_proves_its_values_is_broken_by_a_few_ulp(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, scene: str, level: str, ulps: int
+) -> None:
+    words = ("check", scene, *FEW, "--accuracy", level)
+    assert shell(*words).code == 0
+    _other_values(monkeypatch, level, _ulps_up(ulps))
+    answer = shell(*words)
+    assert answer.code == 4
+    assert "BROKEN" in answer.out
+    assert f"kernel {level}, image 24x24: largest error {ulps}" in answer.err
+    assert f"ulp, stated bound {'4' if level == 'stable' else '0.5'} ulp; " in answer.err
+
+
+@pytest.mark.parametrize("scene", ["chapter1", "two_spheres"])
+def test_a_0_in_place_of_a_value_breaks_a_bound_in_ulp(monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
+    _other_values(monkeypatch, "stable", lambda values: np.where(values < 0.2, 0.0, values))
+    report = check(Scene.builtin(scene), width=24, height=24, count=0, accuracies=("stable",))
+    (row,) = (row for row in report.rows if row.accuracy)
+    assert row.max_ulp == np.inf
+    assert not row.holds
+    with pytest.raises(AccuracyError, match="largest error inf ulp, stated bound 4 ulp"):
+        report.require()
+
+
+def test_a_wrong_hit_of_a_kernel_that_bounds_its_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = SettlingKernel.settle_points
+
+    def settle_points(self: SettlingKernel, values: Any, *arguments: Any, **options: Any) -> Any:
+        left = honest(self, values, *arguments, **options)
+        values[values == 1.0] = 0.0  # what is asked for hits alone: misses pass for hits
+        return left
+
+    monkeypatch.setattr(SettlingKernel, "settle_points", settle_points)
+    report = check(Scene.chapter1(), width=16, height=16, count=0, accuracies=("certified",))
+    with pytest.raises(AccuracyError, match=r"kernel certified, image 16x16: .* wrong hits"):
+        report.require()
+
+
+def test_a_wrong_surface_of_a_level_that_proves_its_values_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene.builtin("two_spheres")
+    _other_values(monkeypatch, "stable", lambda values: np.where(values == 1.0, 2.0, values))  # a number each
+    report = check(scene, width=24, height=24, count=0, accuracies=("stable",))
+    (row,) = (row for row in report.rows if row.accuracy)
+    assert row.wrong_hits > 0
+    assert row.max_ulp <= 4.0
+    assert not row.holds
+
+
+def test_fast_states_no_bound_beyond_its_exponents() -> None:
+    base = stated_bound(Scene.chapter1(), "fast")
+    single = stated_bound(Scene.chapter1(), "single")
+    assert base is not None
+    assert single is not None
+    assert base == pytest.approx(single + 1.3 * 2.0**-11)
+    assert stated_bound(Scene.chapter1(shininess=1001.0), "fast") is None
+    spheres = tuple(structs.replace(s, material=Phong(shininess=1001.0)) for s in Scene.builtin("two_spheres").spheres)
+    shiny = structs.replace(Scene.builtin("two_spheres"), spheres=spheres)
+    report = check(shiny, width=8, height=8, count=0, accuracies=("fast", "single"))
+    assert {row.accuracy: row.bound is None for row in report.rows if row.accuracy} == {"fast": True, "single": False}
+
+
+def test_json_holds_the_bounds_in_ulp(shell: Shell) -> None:
+    data = json.loads(shell("check", *FEW, "--accuracy", "double,stable,certified", "--json").out)
+    stated = {row["accuracy"]: row["bound_ulp"] for row in data["rows"] if row["accuracy"]}
+    assert stated == {"double": None, "stable": 4.0, "certified": 0.5}
 
 
 def test_json_holds_the_rows_of_the_table(shell: Shell) -> None:
@@ -224,11 +332,11 @@ def test_scenes_have_rows_for_their_kernels_and_brute_force(shell: Shell) -> Non
     assert answer.code == 0
     assert "literal is left out" in answer.err
     rows = [line for line in answer.out.splitlines() if line.startswith(("kernel", "brute"))]
-    for evaluator in ("kernel single", "kernel double", "brute force"):
+    for evaluator in (*(f"kernel {name}" for name in ACCURACIES if name != "literal"), "brute force"):
         for where in ("image 24x24", "near outlines", "near mirrored", "near shadows"):
             assert sum(row.startswith(evaluator) and where in row for row in rows) == 1
-    assert len(rows) == 12
-    assert sum(row.endswith("holds") for row in rows) == 8
+    assert len(rows) == 24
+    assert sum(row.endswith("holds") for row in rows) == 20
 
 
 def test_the_numbers_of_a_scene_are_those_of_the_oracle() -> None:
@@ -305,7 +413,8 @@ def test_a_scene_that_comes_down_to_one_sphere_is_checked_as_a_scene() -> None:
     assert pipeline.planned(scene).arrangement is None
     report = check(scene, width=12, height=12, count=40)
     report.require()
-    assert {row.evaluator for row in report.rows} == {"kernel single", "kernel double", "brute force"}
+    kernels = {f"kernel {name}" for name in ACCURACIES if name != "literal"}
+    assert {row.evaluator for row in report.rows} == kernels | {"brute force"}
 
 
 def test_points_in_doubt_of_a_scene_have_decisions_within_rounding(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,14 +34,19 @@ def test_the_shading_loops_of_each_kernel_are_reported_with_their_vector_width(s
     data = json.loads(shell("doctor", "--json").out)
     assert data["usable"] is True
     kernels = {loop["kernel"] for loop in data["loops"]}
-    spheres = {f"centred_sphere_{level}" for level in ("literal", "single", "double")}
-    (scene,) = kernels - spheres
+    spheres = {f"centred_sphere_{level}" for level in ("literal", "fast", "single", "double")}
+    settling = {f"centred_sphere_{level}" for level in ("stable", "certified_uint8")}
+    (scene,) = kernels - spheres - settling
     assert scene == f"{plan(Scene.builtin(doctor.LOOPING_SCENE)).name}_double"
     shading = {loop["function"].removeprefix(f"{scene}_") for loop in data["loops"] if loop["kernel"] == scene}
     assert {"shade_matte", "shade_glossy", "cast_shadows"} <= shading
     for kernel in spheres:
         functions = {loop["function"]: loop["bytes"] for loop in data["loops"] if loop["kernel"] == kernel}
         assert {f"{kernel}_rows", f"{kernel}_points"} <= set(functions)
+        assert all(16 <= width <= 64 for width in functions.values())
+    for kernel in settling:
+        functions = {loop["function"]: loop["bytes"] for loop in data["loops"] if loop["kernel"] == kernel}
+        assert {"settle", "shade_block"} <= set(functions)
         assert all(16 <= width <= 64 for width in functions.values())
     assert all(data["packages"].values())
     assert data["toolchain"]["kind"] in ("gcc", "clang", "zig")

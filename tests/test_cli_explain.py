@@ -9,11 +9,17 @@ from fractions import Fraction
 
 import pytest
 from command_line import Shell
+from evaluators import PROVED
 
 from symrender_cg import Scene, pipeline
 from symrender_cg.cli.latex import escaped
 from symrender_cg.derive.proofs import prove_invariants
-from symrender_cg.explain import explain, swollen_operations
+from symrender_cg.errors import CompilerNotFoundError
+from symrender_cg.explain import FORMATS, explain, proof_of, stages, swollen_operations
+from symrender_cg.lower.variants import variant
+from symrender_cg.pipeline import pixel_size, settling_kernel
+from symrender_cg.run.levels import hands_over
+from symrender_cg.run.numbers import numbers_of
 
 SCENES = ("chapter1", "off_axis", "grazing_light")
 
@@ -144,3 +150,88 @@ def test_operations_of_the_swollen_formulas_are_those_of_the_closed_forms() -> N
     for name in ("t", "n_dot_l", "r_dot_v", "value"):
         assert counts[name] == int(sp.count_ops(image.closed(name)))
     assert counts["image"] == int(sp.count_ops(image.as_piecewise()))
+
+
+# --------------------------------------------------------------------------------------- formats, and levels that prove
+
+
+@pytest.mark.parametrize("accuracy", ["literal", "fast", "double", "stable", "certified"])
+def test_every_quantity_of_the_kernel_is_listed_under_its_number_format(shell: Shell, accuracy: str) -> None:
+    answer = shell("explain", "--accuracy", accuracy)
+    assert answer.code == 0
+    steps = pipeline.translate(Scene.chapter1(), accuracy).program.steps
+    for form in {step.format for step in steps}:
+        names = [step.name for step in steps if step.format == form]
+        row = rf"^{re.escape(FORMATS[form])} +{len(names)}  {', '.join(names)}$"
+        assert re.search(row, answer.out, re.M)
+    data = json.loads(shell("explain", "--accuracy", accuracy, "--json").out)
+    assert {name: form for form, names in data["formats"].items() for name in names} == {
+        step.name: step.format for step in steps
+    }
+
+
+@pytest.mark.parametrize(("accuracy", "target"), PROVED)
+def test_the_bound_of_a_proof_is_that_of_the_kernel_for_the_size(
+    shell: Shell, accuracy: str, target: str | None
+) -> None:
+    words = ("explain", "--accuracy", accuracy, *(() if target is None else ("--target", target)), "--size", "320x200")
+    data = json.loads(shell(*words, "--json").out)
+    chosen = variant(accuracy, target)
+    found = settling_kernel(Scene.chapter1(), chosen, aspect=1.6)
+    assert found is not None
+    kernel, frame = found
+    bound = kernel.bound(kernel.numbers(numbers_of(frame)), width=320, height=200, pixel=pixel_size(frame, 200))
+    proof = data["proof"]
+    assert [stage["name"] for stage in proof["stages"]] == ["kernel", "enclosure", "oracle"]
+    assert proof["stages"][0]["bound"] == bound
+    assert 0.0 < bound < {"float32": 1e-12, "uint8": 1e-12}.get(target or "", 1e-19)
+    assert (proof["width"], proof["height"], proof["handed_over"]) == (320, 200, False)
+    assert proof["stages"][0]["kernel"] == data["kernel"] == kernel.name
+    text = shell(*words).out
+    assert f"proved of every value: {proof['claim']}; " in text
+    assert f"{bound:.2e}" in text
+    assert "any pixel of 320 x 200 can be off" in text
+
+
+def test_double_says_where_it_hands_over_and_else_has_no_proof(shell: Shell) -> None:
+    handed = json.loads(shell("explain", "grazing_light", "--json").out)
+    assert hands_over(Scene.builtin("grazing_light"))
+    assert handed["proof"]["handed_over"] is True
+    assert handed["proof"]["stages"][0]["kernel"] == "centred_sphere_gated_stable"
+    assert "the compensated kernel draws in its place" in shell("explain", "grazing_light").out
+    assert json.loads(shell("explain", "--json").out)["proof"] is None
+    assert "how every value is proved" not in shell("explain").out
+
+
+def test_without_a_compiler_a_proof_has_its_stages_and_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise CompilerNotFoundError("no C compiler found")
+
+    monkeypatch.setattr(stages, "settling_kernel", none)
+    proof = proof_of(Scene.chapter1(), "stable", None, width=8, height=8)
+    assert proof is not None
+    assert [stage.bound for stage in proof.stages] == [None, None, None]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            ("--max-error", "0.1"),
+            "max_error: 0.1 would leave out what changes the image, and 'stable' proves",
+        ),
+        (("--ablate",), "--ablate: what an effect costs is measured where one kernel draws alone, and accuracy stable"),
+        (("--target", "uint8"), "target: 'uint8' is for accuracy='certified', not for 'stable'"),
+    ],
+)
+def test_what_a_proof_excludes_is_refused(shell: Shell, words: tuple[str, ...], text: str) -> None:
+    answer = shell("explain", "--accuracy", "stable", *words)
+    assert answer.code == 2
+    assert text in answer.err
+
+
+def test_a_level_that_proves_its_values_is_set_in_latex_too(shell: Shell) -> None:
+    for scene in ("chapter1", "two_spheres"):
+        text = shell("explain", scene, "--accuracy", "certified", "--target", "float32", "--latex").out
+        assert "Accuracy ``certified\\_float32''" in text
+        assert text.endswith("\\end{document}\n")

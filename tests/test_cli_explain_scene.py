@@ -149,3 +149,29 @@ def test_a_tolerance_names_bounded_effects_with_their_bounds(shell: Shell) -> No
     assert f"changes no pixel by more than {found.bound:.3g}" in text
     assert "changes at most" in text
     assert any(d.status == "bounded" for d in found.summary) == bool(re.search(r"^bounded ", text, re.M))
+
+
+@pytest.mark.parametrize("accuracy", ["stable", "certified"])
+def test_of_a_scene_the_enclosure_is_explained_for_any_window(shell: Shell, accuracy: str) -> None:
+    data = json.loads(shell("explain", "lights", "--accuracy", accuracy, "--size", "300x200", "--json").out)
+    translation = pipeline.translate(Scene.builtin("lights"), accuracy)
+    assert data["kernel"] == translation.emitted.name == f"{translation.plan.name}_enclosure"
+    assert data["aspect"] is None
+    assert {part["name"]: part["formats"].keys() <= {"ball", "float64"} for part in data["parts"]} == dict.fromkeys(
+        translation.programs, True
+    )
+    assert [stage["name"] for stage in data["proof"]["stages"]] == ["enclosure", "oracle"]
+    assert data["proof"]["stages"][0]["kernel"] == data["kernel"]
+    text = shell("explain", "lights", "--accuracy", accuracy).out
+    assert "near: a sphere and a ray of the eye: hit, normal, distance" in text
+    assert re.search(r"^ball: a double-double and a bound of its error +\d+  ", text, re.M)
+    assert re.search(r"^enclosure +all points +scene_gated_fade_shadow_rgb_enclosure ", text, re.M)
+
+
+def test_formats_of_a_scene_are_those_of_its_parts(shell: Shell) -> None:
+    data = json.loads(shell("explain", "mirrors", "--accuracy", "single", "--json").out)
+    programs = pipeline.translate(Scene.builtin("mirrors"), "single", aspect=1.0).programs
+    for part in data["parts"]:
+        listed = {name: form for form, names in part["formats"].items() for name in names}
+        assert listed == {step.name: step.format for step in programs[part["name"]].steps}
+    assert data["proof"] is None

@@ -5,14 +5,22 @@ from __future__ import annotations
 import io
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from command_line import LOADED_AFTER, Shell, in_a_process
+from evaluators import PROVED
 from PIL import Image
 
 from symrender_cg import Scene, render_image, render_layers
 from symrender_cg.cli import layers, parser, progress, render
+from symrender_cg.errors import AccuracyError
+from symrender_cg.reference import oracle
+from symrender_cg.run import certify as certify_module
+from symrender_cg.run.render import certify
+
+GREY = ("--accuracy", "certified", "--target", "uint8")
 
 
 @pytest.fixture
@@ -20,7 +28,7 @@ def shell(capsys: pytest.CaptureFixture[str]) -> Shell:
     return Shell(capsys)
 
 
-@pytest.mark.parametrize("accuracy", ["literal", "single", "double"])
+@pytest.mark.parametrize("accuracy", ["literal", "fast", "single", "double"])
 @pytest.mark.parametrize("scene", ["chapter1", "off_axis"])
 def test_npy_holds_the_image_of_render_image_bit_for_bit(
     shell: Shell, tmp_path: Path, scene: str, accuracy: str, monkeypatch: pytest.MonkeyPatch
@@ -36,7 +44,7 @@ def test_npy_holds_the_image_of_render_image_bit_for_bit(
     assert np.load(path).dtype == expected.dtype
 
 
-@pytest.mark.parametrize("accuracy", ["literal", "single", "double"])
+@pytest.mark.parametrize("accuracy", ["literal", "fast", "single", "double"])
 def test_the_numpy_backend_writes_what_render_image_gives(
     shell: Shell, tmp_path: Path, accuracy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,6 +110,16 @@ def test_list_names_each_built_in_scene_with_its_description(shell: Shell) -> No
         (("-o", "a.png", "--layers", "depth", "--backend", "numpy"), "leave --backend numpy out"),
         (("-o", "a.png", "--threads", "0"), "threads: 0 is not a number of threads"),
         (("-o", "a.png", "--size", "16777216x16777216"), "does not fit into memory; render a smaller one"),
+        (("-o", "a.png", "--target", "uint8"), "target: 'uint8' is for accuracy='certified', not for 'double'"),
+        ((*GREY, "-o", "a.png", "--encoding", "srgb"), "encoding: 'srgb' would round grey levels a second time"),
+        ((*GREY, "-o", "a.png", "--bits", "16"), "bits: 16 has no meaning for grey levels of 0 to 255"),
+        ((*GREY, "-o", "a.pfm"), "a.pfm: a .pfm holds floats, not grey levels of 0 to 255; write a .png, .npy or .npz"),
+        ((*GREY, "-o", "a.npy", "--no-clip"), "--no-clip: grey levels end at 255"),
+        (
+            ("-o", "a.npy", "--accuracy", "stable", "--layers", "all"),
+            "--layers: accuracy stable proves the image alone",
+        ),
+        (("-o", "a.npy", "--accuracy", "certified", "--backend", "numpy"), "certified is proved by native kernels"),
     ],
 )
 def test_what_cannot_be_written_is_refused_and_leaves_no_file(
@@ -247,3 +265,94 @@ def test_pictures_of_nothing_are_black() -> None:
 def test_names_of_layers_stand_for_those_of_render_layers(text: tuple[str, ...], chosen: tuple[str, ...]) -> None:
     assert layers.chosen_layers(text) == chosen
     assert parser.LAYERS == layers.LAYERS
+
+
+# --------------------------------------------------------------------------------------- levels that prove their values
+
+
+@pytest.mark.parametrize(("accuracy", "target"), PROVED)
+@pytest.mark.parametrize("scene", ["chapter1", "two_spheres"])
+def test_what_is_proved_is_written_as_render_image_gives_it(
+    shell: Shell, tmp_path: Path, scene: str, accuracy: str, target: str | None
+) -> None:
+    path = tmp_path / "a.npy"
+    rounding = () if target is None else ("--target", target)
+    answer = shell("render", scene, "-o", path, "--size", "37x29", "--accuracy", accuracy, *rounding)
+    assert answer.code == 0
+    expected = render_image(scene, 37, 29, accuracy=accuracy, target=target)
+    assert np.array_equal(np.load(path), expected)
+    assert np.load(path).dtype == expected.dtype
+    first, certificate = answer.out.splitlines()
+    assert first.startswith(f"{path}: 37 x 29, numpy array, linear; {' '.join(filter(None, (accuracy, target)))}, ")
+    assert f"{'centred_sphere' if scene == 'chapter1' else 'scene_enclosure'}" in first
+    if target is not None:
+        assert certificate == str(certify(scene, 37, 29, target=target).certificate)
+    else:
+        assert certificate.startswith("within 4 ulp at all 1,073: ")
+
+
+def test_no_clip_keeps_what_is_proved_above_1(shell: Shell, tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    assert shell("render", "-o", path, "--size", "40x40", "--accuracy", "stable", "--no-clip").code == 0
+    assert np.load(path).max() > 1.2
+    assert np.array_equal(np.load(path), render_image(None, 40, 40, accuracy="stable", clip=False))
+
+
+@pytest.mark.parametrize("scene", ["chapter1", "lights"])
+def test_certified_grey_levels_reach_the_picture_as_they_are(shell: Shell, tmp_path: Path, scene: str) -> None:
+    path = tmp_path / "a.png"
+    answer = shell("render", scene, "-o", path, "--size", "40x30", *GREY)
+    assert answer.code == 0
+    levels = certify(scene, 40, 30, target="uint8").values
+    assert levels.dtype == np.uint8
+    assert levels.max() == 255
+    picture = Image.open(path)
+    assert np.array_equal(np.asarray(picture), levels)
+    assert picture.info["gamma"] == 1.0
+    kind = "grey" if levels.ndim == 2 else "RGB"
+    assert f"40 x 30, 8 bit {kind}, linear; certified uint8, " in answer.out
+    assert "the right grey level at all 1,200: " in answer.out
+
+
+def test_grey_levels_in_a_npz_are_whole_numbers(shell: Shell, tmp_path: Path) -> None:
+    assert shell("render", "-o", tmp_path / "a.npz", "--size", "20x20", *GREY).code == 0
+    with np.load(tmp_path / "a.npz") as held:
+        assert np.array_equal(held["image"], render_image(None, 20, 20, accuracy="certified", target="uint8"))
+        assert held["image"].dtype == np.uint8
+
+
+def test_double_says_where_the_compensated_kernel_draws_in_its_place(shell: Shell, tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    answer = shell("render", "grazing_light", "-o", path, "--size", "24x24")
+    assert answer.code == 0
+    first, second = answer.out.splitlines()
+    assert "; double, drawn by the compensated kernel: centred_sphere_gated_stable " in first
+    assert second.startswith("plain float64 may be off by more than 1e-15 in this scene; within 4 ulp at all 576: ")
+    assert np.array_equal(np.load(path), render_image("grazing_light", 24, 24, accuracy="stable"))
+    assert len(shell("render", "-o", path, "--size", "24x24").out.splitlines()) == 1
+
+
+def test_a_certificate_that_cannot_be_given_names_the_pixels_with_exit_code_4(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def undecided(scene: Scene, x: Any, y: Any, target: str) -> Any:
+        raise AccuracyError("two values are open", (0, 13))
+
+    def nothing(job: Any, points: Any, places: Any) -> Any:
+        return np.zeros((places.size, 1)), np.zeros(places.size, dtype=bool), 0.0
+
+    monkeypatch.setattr(certify_module, "_enclosed", nothing)
+    monkeypatch.setattr(oracle, "settle", undecided)
+    answer = shell("render", "two_spheres", "-o", tmp_path / "a.npy", "--size", "12x10", "--accuracy", "certified")
+    assert answer.code == 4
+    assert "2 of 120 values are not settled: column 0, row 0; column 1, row 1; " in answer.err
+    assert "move the scene or the camera by one float" in answer.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_warm_start_of_what_is_proved_loads_no_sympy_either(tmp_path: Path) -> None:
+    words = ("render", "off_axis", "-o", tmp_path / "a.png", "--size", "64x64", *GREY)
+    assert in_a_process(*words).code == 0
+    answer = in_a_process(*words, code=LOADED_AFTER)
+    assert answer.code == 0, answer.err
+    assert answer.out.splitlines()[-1] == "loaded:"

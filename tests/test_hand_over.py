@@ -105,13 +105,13 @@ def random_one_sphere(seed: int) -> Scene:
     draw = random.Random(seed)
     radius = draw.uniform(0.5, 2.0)
     eye = radius * (1.0 + 10.0 ** draw.uniform(-1.5, 3.0))
-    n = draw.choice((10.0 ** draw.uniform(0.0, 3.0), 1000.0, draw.uniform(0.0, 1.0), float(draw.randint(0, 200))))
-    distance = 10.0 ** draw.choice((draw.uniform(-3.0, 2.0), draw.uniform(-3.0, -1.0), -3.0))
+    n = draw.choice((draw.uniform(1.0, 8.0), 10.0 ** draw.uniform(0.0, 3.0), 1000.0, draw.uniform(0.0, 1.0), 0.0, 2.0))
+    distance = 10.0 ** draw.choice((draw.uniform(-3.0, 2.0), draw.uniform(-1.0, 1.0), draw.uniform(0.0, 2.0), -3.0))
     away = radius * (1.0 + distance if draw.random() < 0.8 or distance >= 1.0 else 1.0 - distance)
     way = np.array([draw.gauss(0.0, 1.0), draw.gauss(0.0, 1.0), abs(draw.gauss(0.0, 1.0))])
     x, y, z = (float(part) for part in away * way / np.linalg.norm(way))
     material = Phong(
-        draw.choice((0.0, 0.1)), draw.choice((0.0, 0.7, 1.0)), draw.choice((0.0, 0.5, 1.0)), n, draw.random() < 0.3
+        draw.choice((0.0, 0.1)), draw.choice((0.3, 0.7, 1.0)), draw.choice((0.1, 0.5, 1.0)), n, draw.random() < 0.15
     )
     center = (0.0, 0.0, 0.0)
     if draw.random() < 0.4:
@@ -146,7 +146,7 @@ def hardest_points(scene: Scene, draw: random.Random) -> tuple[np.ndarray, np.nd
 
 
 def test_double_errs_by_at_most_1e_15_of_the_light_where_it_says_so() -> None:
-    """|error| <= 1e-15 max(1, I, value); half of the scenes hand over, half do not."""
+    """|error| <= 1e-15 max(1, value); most of the scenes hand over, the others do not."""
     worst, handed = (0.0, ""), 0
     for seed in range(SCENES):
         scene = random_one_sphere(seed)
@@ -154,12 +154,10 @@ def test_double_errs_by_at_most_1e_15_of_the_light_where_it_says_so() -> None:
         x, y = hardest_points(scene, random.Random(seed))
         true = oracle.evaluate(scene, x, y)
         values = evaluate(scene, x, y)
-        light = scene.lights[0]
-        assert isinstance(light.intensity, float)
         for k in range(values.size):
             error = Fraction(float(values[k])) - Fraction(float(true.value[k])) - Fraction(float(true.residual[k]))
-            share = abs(float(error)) / max(1.0, light.intensity, float(true.value[k]))
+            share = abs(float(error)) / max(1.0, float(true.value[k]))
             worst = max(worst, (share, f"seed {seed} at {x[k]!r}, {y[k]!r}: {values[k]!r}, true {true.value[k]!r}"))
     print(f"largest error {worst[0]:.3e}; {handed} of {SCENES} scenes were handed over; {worst[1]}")
     assert worst[0] <= 1e-15, worst[1]
-    assert 0.2 * SCENES < handed < 0.95 * SCENES
+    assert 0.3 * SCENES < handed < 0.85 * SCENES

@@ -151,7 +151,9 @@ FAMILIES: dict[str, Callable[[Random], Scene]] = {
 #     double         2.6e-16  1.3e-15  1.2e-15  8.0e-16  7.0e-16  1.3e-15  6.1e-16  1.0e-15  6.8e-16
 #     single         1.6e-7   1.1e-6   5.8e-7   3.9e-7   3.5e-7   5.7e-7   3.6e-7   7.2e-7   4.0e-7
 #     numpy_stable   3.6e-16  2.5e-15  1.4e-15  4.9e-15  1.3e-15  3.7e-15  1.2e-15  2.3e-15  1.1e-15
-BOUND = {"double": 8e-15, "single": 4e-6, "numpy_stable": 2e-14}
+# and over 60 scenes and 3,600 points:
+#     fast           7.2e-5   1.7e-4   2.2e-4   1.0e-4   1.3e-4   1.2e-4   7.8e-5   1.2e-4   3.0e-7
+BOUND = {"double": 8e-15, "single": 4e-6, "fast": 1e-3, "numpy_stable": 2e-14}
 
 
 def points_of(scene: Scene, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -192,6 +194,7 @@ GRID_BOUND = {
     "literal": 2e-13,  # 8.3e-15  1.3e-13  4.8e-15
     "double": 2e-15,  # 7.1e-16  5.6e-16  4.7e-16
     "single": 1e-6,  # 2.9e-7   3.4e-7   2.8e-7
+    "fast": 2e-4,  # 7.4e-5   7.4e-5   7.5e-5
     "baked": 2e-15,  # 7.1e-16  6.7e-16  5.8e-16
 }
 
@@ -319,7 +322,8 @@ def test_an_effect_without_a_coefficient_changes_no_bit(
 ) -> None:
     scene = scene_of(geometry, material, light=(3.0, -4.0, -1.0))
     x, y = square_of_points(scene, 64)
-    assert same_bits(evaluate(scene, x, y, accuracy=accuracy), evaluate_forced(scene, x, y, accuracy, [effect]))
+    planned, forced = (evaluate_forced(scene, x, y, accuracy, force) for force in ([], [effect]))
+    assert same_bits(planned, forced)
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)
@@ -356,8 +360,8 @@ def test_the_gate_only_removes_highlights_where_the_light_is_below_the_horizon(a
     light = _vector(behind)  # paints a false highlight past the terminator when it is not gated
     scene, gated = (scene_of(geometry, Phong(0.1, 0.7, 0.5, 4.0, gate), light) for gate in (False, True))
     points = square_of_points(scene, 64)
-    free, held = (evaluate(entry, *points, accuracy=accuracy) for entry in (scene, gated))
-    matte = evaluate(scene_of(geometry, Phong(0.1, 0.7, 0.0), light), *points, accuracy=accuracy)
+    bare = scene_of(geometry, Phong(0.1, 0.7, 0.0), light)
+    free, held, matte = (evaluate_forced(entry, *points, accuracy, []) for entry in (scene, gated, bare))
     dark = matte == matte.dtype.type(0.1)
     assert np.array_equal(held[dark], matte[dark])
     assert same_bits(held[~dark], free[~dark])
@@ -386,13 +390,14 @@ def test_a_light_exactly_at_the_hit_point_adds_nothing(entry: Evaluator, radius:
 def test_any_shininess_is_right(entry: Evaluator, shininess: float, light: Vector) -> None:
     """0^0 = 1 also where r.v < 0, and 0^n = 0 for the smallest n > 0.
 
-    Measured: double 1.2e-15, single 1.1e-6, at n = 0.5 near r.v = 0, where a power below 1 magnifies the error.
+    Measured: double 1.2e-15, single 1.1e-6, at n = 0.5 near r.v = 0, where a power below 1 magnifies the error; fast
+    6.2e-5 at n = 32.
     """
     scene = Scene.chapter1(shininess=shininess, light=light)
     x, y = square_of_points(scene, 31)  # the middle one looks straight at the mirror image of the second light
     errors = measure(entry.values(scene, x, y), oracle.evaluate(scene, x, y))
     assert errors.nonfinite == 0
-    assert errors.max_abs <= {"single": 1e-5}.get(entry.name, 2e-14)
+    assert errors.max_abs <= {"single": 1e-5, "fast": 2e-4}.get(entry.name, 2e-14)
 
 
 @modest(60)

@@ -1,4 +1,4 @@
-"""Kernels that bound their own error: ranges of every step, C without a warning, and bounds that the oracle never breaks."""
+"""Kernels that bound their own error: ranges of every step, C without a warning, bounds that no oracle ever breaks."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ RUN = (
     else ["centred_sphere", "centred_sphere_flat", "off_axis_sphere_gated", "any_sphere_specular"]
 )
 """Structures whose kernels are compiled and called; all of them are checked by the compilers."""
-PLANS = {"centred_sphere", "centred_sphere_gated", "off_axis_sphere", "any_sphere"}
+PLANS = {"centred_sphere", "centred_sphere_matte", "centred_sphere_gated", "any_sphere"}
 """Plans that the hunts look at, unless thorough: each costs four kernels."""
 
 
@@ -175,7 +175,7 @@ def test_lines_are_at_most_120_columns_and_end_in_no_space() -> None:
 
 
 @pytest.mark.parametrize("level", BY_NAME)
-@pytest.mark.parametrize("name", ["centred_sphere", "off_axis_sphere_gated", "any_sphere_specular"])
+@pytest.mark.parametrize("name", ["centred_sphere", "any_sphere_specular"])
 def test_the_loop_over_pixels_is_a_loop_over_vectors(name: str, level: str) -> None:
     files = translated(name, level).emitted
     toolchain = find_toolchain()

@@ -1,4 +1,4 @@
-"""pair.h against rational arithmetic: what each operation loses is within the bound of its comment, cancellation included."""
+"""pair.h against rational arithmetic: what an operation loses is within the bound of its comment, cancelling or not."""
 
 from __future__ import annotations
 

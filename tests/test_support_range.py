@@ -31,6 +31,8 @@ DRAWS = 40_000 if THOROUGH else 400
 C = r"""
 #include "range.h"
 #include "pair.h"
+#include "phong_power.h"
+#include "precise_power.h"
 #include <stddef.h>
 
 static range range_of(const double *p)
@@ -87,7 +89,8 @@ void apply(int operation, int form, const double *a, const double *b, const doub
             break;
         case 7:
             found = range_positive_part(p);
-            d = f == FLOAT64 ? dd_from(v.hi > 0.0 ? v.hi : 0.0) : f == PAIR ? pair_positive_part(v) : dd_positive_part(v);
+            d = f == FLOAT64 ? dd_from(v.hi > 0.0 ? v.hi : 0.0)
+                : f == PAIR ? pair_positive_part(v) : dd_positive_part(v);
             break;
         case 8: found = range_neg(p); d = dd_neg(v); break;
         case 9: found = range_scaled(p, 0x1p-7); d = dd_scale(v, 0x1p-7); break;
@@ -120,6 +123,23 @@ void apply(int operation, int form, const double *a, const double *b, const doub
     }
 }
 
+void powers(int form, const double *a, const double *b, const double *n, const double *x, const double *y, double *r,
+            double *z, ptrdiff_t count)
+{
+    for (ptrdiff_t i = 0; i < count; ++i) {
+        const range p = range_of(a + 7 * i), q = range_of(b + 7 * i), e = range_exact(n[i]);
+        const double_double c = {x[2 * i], x[2 * i + 1]}, s = {y[2 * i], y[2 * i + 1]};
+        const double_double d = form == FLOAT64 ? dd_from(power_of_cosine(c.hi, s.hi, n[i]))
+                                                : precise_power_of_cosine(c, s, n[i]);
+        if (form == FLOAT64)
+            put(r + 7 * i, range_power_of_cosine(FLOAT64, p, q, e, 0.0, POWER_ERROR));
+        else
+            put(r + 7 * i, range_power_of_cosine(PAIR, p, q, e, PRECISE_POWER_ERROR, PRECISE_POWER_FLOOR));
+        z[2 * i] = d.hi;
+        z[2 * i + 1] = d.lo;
+    }
+}
+
 void errors(const double *a, double *bound, ptrdiff_t count)
 {
     for (ptrdiff_t i = 0; i < count; ++i)
@@ -135,6 +155,8 @@ CDEF = """
 void apply(int, int, const double *, const double *, const double *, const double *, double *, double *, ptrdiff_t);
 void errors(const double *, double *, ptrdiff_t);
 double light_gap2(const double *, const double *, const double *);
+void powers(int, const double *, const double *, const double *, const double *, const double *, double *, double *,
+            ptrdiff_t);
 """
 
 
@@ -211,8 +233,21 @@ def size_of_error(draw: random.Random, kind: str) -> float:
     return draw.uniform(0.5, 1.0) * 2.0 ** -draw.randint(9, 40)
 
 
-def operand(draw: random.Random, form: int, *, drowned: bool, positive: bool = False, away: bool = False) -> Operand:
-    """An operand whose true value is as far from what the kernel holds as its range admits, or less."""
+def operand(
+    draw: random.Random,
+    form: int,
+    *,
+    drowned: bool,
+    positive: bool = False,
+    away: bool = False,
+    cut: bool = False,
+    factor: bool = False,
+) -> Operand:
+    """An operand whose true value is as far from what the kernel holds as its range admits, or less.
+
+    positive, away    v >= 0, v and its errors clear of 0
+    cut, factor       for max(0, a), where a relative error and a root at once are not counted to the last; see FACTORS
+    """
     size = 2.0 ** draw.choice((0, 0, 0, draw.randint(-4, 4), draw.randint(-60, 60), draw.randint(-200, 200)))
     hi = size * draw.choice((1.0, draw.uniform(1.0, 2.0), 1.0 + draw.randint(0, 8) * 2.0**-52, 2.0 - 2.0**-52))
     if not (positive or draw.random() < 0.6):
@@ -221,7 +256,7 @@ def operand(draw: random.Random, form: int, *, drowned: bool, positive: bool = F
         hi = 0.0
     kinds = ("none", "plain", "plain", "large", *(("drowned", "drowned") if drowned else ()))
     kind = draw.choice(kinds if form == FLOAT64 else ("wide", "wide", *kinds))
-    smallest = 1 if drowned else 9
+    smallest = 1 if drowned and not factor else 9
     relative, root, absolute = (size_of_error(draw, kind) for _unused in range(3))
     lo, low_relative, low = 0.0, 0.0, 0.0
     if form == DOUBLE_DOUBLE:
@@ -229,8 +264,12 @@ def operand(draw: random.Random, form: int, *, drowned: bool, positive: bool = F
         lo = draw.choice((0.0, draw.uniform(-0.5, 0.5), 0.4999)) * math.ulp(hi) if hi else 0.0
     if form == PAIR:
         low_relative = draw.choice((0.0, U, 4.0 * U, 2.0 ** -draw.randint(smallest, 50)))
-        low = size * draw.choice((0.0, U, 2.0 ** -draw.randint(smallest, 60), 8.0 if kind == "drowned" else 0.0))
+        low = size * draw.choice(
+            (0.0, U, 2.0 ** -draw.randint(smallest, 60), 8.0 if kind == "drowned" and not factor else 0.0)
+        )
         lo = draw.choice((-1.0, 1.0, draw.uniform(-1.0, 1.0))) * (0.99 * low_relative * abs(hi) + low)
+    if cut:
+        relative = 0.0 if root else relative
     low = enough_low(hi, lo, low_relative, low)
     root *= math.sqrt(size)
     absolute *= size
@@ -252,7 +291,7 @@ def operand(draw: random.Random, form: int, *, drowned: bool, positive: bool = F
     if positive and true < 0:
         true = Fraction(0)
         if not bare.allows(true, computed):
-            return operand(draw, form, drowned=drowned, positive=positive, away=away)
+            return operand(draw, form, drowned=drowned, positive=positive, away=away, cut=cut, factor=factor)
     least, most = ends(draw, true, size, positive=positive, away=away)
     return Operand(replace(bare, least=least, most=most), true, hi, lo)
 
@@ -335,19 +374,24 @@ OPERATIONS: dict[str, Operation] = {
     "difference of doubles": Operation(17, lambda a, b: a - b, ("float64",)),
     "product of doubles": Operation(18, lambda a, b: a * b, ("float64",)),
 }
+FACTORS = {"product", "square", "inverse", "quotient", "root", "product with a double"}
+"""Operations on pairs whose ranges leave out products of three lows: here lows are at most 2^-9 of the value."""
 CASES = [(name, form) for name, operation in OPERATIONS.items() for form in operation.formats]
 
 
 def operands(draw: random.Random, name: str, form: int, *, drowned: bool) -> tuple[Operand, Operand]:
     operation = OPERATIONS[name]
-    x = operand(draw, form, drowned=drowned, positive=operation.positive, away=operation.away[0])
+    factor, cut = name in FACTORS, name == "positive_part"
+    x = operand(
+        draw, form, drowned=drowned, positive=operation.positive, away=operation.away[0], cut=cut, factor=factor
+    )
     second = FLOAT64 if operation.second == "double" else form
     if operation.code in (0, 1, 13, 14, 16, 17) and draw.random() < 0.4:
         y = opposite(draw, second, x, drowned=drowned)
         if operation.code in (1, 13, 17):
             y = negated(y)
     else:
-        y = operand(draw, second, drowned=drowned, away=operation.away[1])
+        y = operand(draw, second, drowned=drowned, away=operation.away[1], factor=factor)
     if second == FLOAT64:
         y = plain(y)
     if operation.second == "one is a double":
@@ -445,3 +489,147 @@ def test_no_operands_that_hypothesis_finds_lead_out_either(
     name, form = case
     pairs = [operands(draw, name, FORMATS[form], drowned=drowned) for _k in range(4)]
     assert not violations(name, FORMATS[form], pairs)
+
+
+# -------------------------------------------------------------------------------------------------------- the highlight
+
+
+def cosine(draw: random.Random, n: float) -> Fraction:
+    """r.v from 1 down to 0: where the power falls, all over, and next to 0; for n < 2 not below 2^-10."""
+    kind = draw.choice(("top", "top", "all", "zero"))
+    if kind == "top":
+        sin2 = Fraction(min(0.9, draw.uniform(0.0, 40.0) / max(n, 1.0))) * Fraction(draw.choice((1.0, 1e-3, 1e-12)))
+        found = Fraction(math.sqrt(float(1 - sin2))) if sin2 > 1e-6 else 1 - sin2 / 2
+    else:
+        found = Fraction(draw.random() if kind == "all" else 10.0 ** -draw.uniform(0.0, 20.0))
+    return max(found, Fraction(1, 2**10)) if n < 2.0 else found
+
+
+def a_power(draw: random.Random, form: int) -> tuple[Operand, Operand, float, Fraction]:
+    """cos^2 and sin^2 as a kernel holds them, n, and r.v, which is negative where its sign was lost."""
+    n = draw.choice((10.0 ** draw.uniform(-3.0, 13.0), float(draw.randint(1, 200)), draw.uniform(0.0, 2.0), 1.0, 2.0))
+    true = cosine(draw, n)
+    unit = U if form == FLOAT64 else U * U
+    root, absolute, relative = (unit * 2.0 ** draw.uniform(0.0, 12.0) * draw.choice((0.0, 1.0)) for _k in range(3))
+    if draw.random() < 0.2:
+        root, absolute = root + 10.0 ** draw.uniform(-12.0, -3.0) / n, absolute + 10.0 ** draw.uniform(-12.0, -1.0) / n
+    least, most = (2.0**-20 if n < 2.0 else 0.0), 1.0
+    off = Fraction(root) * draw.choice((-1, 0, 1))
+    lost = off < 0 and n >= 2.0 and draw.random() < 0.2
+    if lost:  # r.v < 0 was computed as positive
+        true = -draw.choice((Fraction(0), Fraction(1, 2), Fraction(999, 1000))) * abs(off)
+        off = -off
+    held = abs(true + off)
+    cos2 = held**2 * (1 + draw.choice((-1, 0, 1)) * Fraction(relative)) + draw.choice((0, 1)) * Fraction(absolute)
+    if form == PAIR:
+        shift = draw.choice((0.0, 2.0**-53, -(2.0**-50), 2.0**-51))
+        word = float(held) - shift
+        hi = word * word
+        lo = float(cos2 - Fraction(hi))
+        low = 2.0 * abs(shift) + 4.0 * U
+        computed = Operand(Range(least, most, relative + 2.0**-104, root, absolute, 4.0 * U, low), true**2, hi, lo)
+    else:
+        computed = Operand(Range(least, most, relative + 2.0 * U, root, absolute), true**2, float(cos2), 0.0)
+    sin2_true = 1 - true**2
+    if form == PAIR:  # the complement of what is held of cos^2
+        hi = 1.0 - computed.hi
+        lo = float(1 - cos2 - Fraction(hi))
+        bound = relative + 2.0 * root + root**2 + absolute + 2.0**-104
+        sine = Operand(Range(0.0, 1.0, absolute=bound, low_relative=U, low=low + U), sin2_true, hi, lo)
+    else:
+        size = Fraction(math.sqrt(max(0.0, float(sin2_true))))
+        held_sin2 = (size + draw.choice((-1, 0, 1)) * Fraction(root)) ** 2 if size else Fraction(root) ** 2
+        held_sin2 *= 1 + draw.choice((-1, 0, 1)) * Fraction(relative)
+        bounds = Range(0.0, 1.0, relative + 4.0 * U, root * (1.0 + 4.0 * U), absolute)
+        sine = Operand(bounds, sin2_true, float(held_sin2), 0.0)
+    return computed, sine, n, true
+
+
+@pytest.mark.parametrize("form", ["float64", "pair"])
+def test_powers_of_a_cosine_are_within_their_range(form: str) -> None:
+    """Errors of cos^2 and sin^2 as of a kernel's steps, and now and then as large as the range admits."""
+    draw = random.Random(form)
+    cases = [case for case in (a_power(draw, FORMATS[form]) for _k in range(4 * DRAWS)) if admitted(case)]
+    assert len(cases) > 2 * DRAWS
+    a, b = (np.array([case[k].range.row for case in cases]) for k in (0, 1))  # type: ignore[union-attr]
+    x, y = (np.array([(case[k].hi, case[k].lo) for case in cases]) for k in (0, 1))  # type: ignore[union-attr]
+    n = np.array([case[2] for case in cases])
+    r, z = np.empty((len(cases), 7)), np.empty((len(cases), 2))
+    library().call("powers", FORMATS[form], a, b, n, x, y, r, z, len(cases))
+    bounded, worst = 0, 0.0
+    with mpmath.workprec(400):
+        for (cos2, sin2, exponent, true), row, (hi, lo) in zip(cases, r.tolist(), z.tolist(), strict=True):
+            found = Range(*row)
+            value = mpmath.mpf(0)
+            if true > 0:
+                value = (mpmath.mpf(true.numerator) / true.denominator) ** mpmath.mpf(exponent)
+            away = abs(mpmath.mpf(hi) + mpmath.mpf(lo) - value)
+            bound = mpmath.mpf(found.relative) * value + mpmath.mpf(found.absolute)
+            sizes = f"off {mpmath.nstr(away)}, bound {mpmath.nstr(bound)}"
+            where = f"{cos2} {sin2} n {exponent!r} r.v {float(true)!r}: {sizes}"
+            assert away <= bound * (1 + mpmath.mpf(2) ** -8) + mpmath.mpf(2) ** -900, where
+            assert math.isinf(found.absolute) or abs(lo) <= found.low_relative * abs(hi) * (1.0 + 2.0**-8), where
+            bounded += not math.isinf(found.absolute)
+            worst = max(worst, float(away / bound))
+    assert bounded > len(cases) // 2
+    print(f"{form}: {bounded} of {len(cases)} bounded, largest share of the bound {worst:.3f}")
+
+
+def admitted(case: tuple[Operand, Operand, float, Fraction]) -> bool:
+    """Whether both operands are as their ranges say."""
+    return all(
+        op.range.holds(op.true) and op.range.allows(op.true, op.computed) and op.range.allows_low(op.computed, op.lo)
+        for op in case[:2]
+    )
+
+
+# ---------------------------------------------------------------------------------------------------------- the rest
+
+
+def test_a_known_number_is_within_its_range() -> None:
+    """range_known: the true value is within one rounding of what is known; range_known_wide: within 2^-100."""
+    draw = random.Random(7)
+    true = [Fraction(draw.uniform(-1.0, 1.0)) + Fraction(draw.uniform(-1.0, 1.0)) / 2**60 for _k in range(500)]
+    hi = [float(v) for v in true]
+    lo = [float(v - Fraction(h)) for v, h in zip(true, hi, strict=True)]
+    a = np.array([(h, h, *[0.0] * 5) for h in hi])
+    x = np.array(list(zip(hi, lo, strict=True)))
+    for code, words in ((20, 1), (21, 2)):
+        r, z = np.empty((500, 7)), np.empty((500, 2))
+        library().call("apply", code, DOUBLE_DOUBLE, a, a, x, x, r, z, 500)
+        for row, v, h, rest in zip(r.tolist(), true, hi, lo, strict=True):
+            found, computed = Range(*row), _(h) + (_(rest) if words == 2 else 0)
+            assert found.holds(v)
+            assert found.allows(v, computed)
+            assert found.allows_low(computed, rest if words == 2 else 0.0)
+
+
+def test_the_error_of_a_range_is_the_largest_that_it_admits_and_unknown_is_infinite() -> None:
+    draw = random.Random(8)
+    found = [operand(draw, PAIR, drowned=False) for _k in range(500)]
+    a = np.array([x.range.row for x in found])
+    bound = np.empty(500)
+    library().call("errors", a, bound, 500)
+    for x, most in zip(found, bound.tolist(), strict=True):
+        assert most == math.inf or abs(x.computed - x.true) <= _(most)
+    odd = np.array([(0.0, 1.0, math.nan, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0, math.inf, 0.0, 0.0)])
+    library().call("errors", odd, bound, 2)
+    assert bound[:2].tolist() == [math.inf, math.inf]
+
+
+def test_no_light_is_nearer_to_the_unit_sphere_than_the_gap_says() -> None:
+    draw = random.Random(9)
+    for _k in range(400):
+        near = 1.0 + draw.choice((-1, 1)) * 10.0 ** draw.uniform(-15.0, -1.0)
+        away = draw.choice((10.0 ** draw.uniform(-3.0, 3.0), near))
+        way = [draw.gauss(0.0, 1.0) for _j in range(3)]
+        length = math.sqrt(sum(v * v for v in way))
+        lamp = [away * v / length for v in way]
+        rows = []
+        for v in lamp:
+            room = abs(v) * draw.choice((0.0, 2.0**-50, 1e-3))
+            rows.append(np.array((v - room * draw.random(), v + room * draw.random(), *[0.0] * 5)))
+        gap = library().call("light_gap2", *rows)
+        with mpmath.workprec(200):
+            true = (mpmath.sqrt(sum(mpmath.mpf(v) ** 2 for v in lamp)) - 1) ** 2
+            assert gap <= true

@@ -80,21 +80,27 @@ static inline power_parts power_split_one_minus(double g)
     return parts;
 }
 
-/* log2 of 2^k (1 + f) <= 1                           error <= 2.78 u relative to the logarithm
+/* ln(1 + f), 11/16 <= 1 + f < 11/8
  * s = f / (2 + f) and z = s^2 give ln(1 + f) = 2 atanh(s) = 2 s + s z p(z) = f - (f^2/2 - s (f^2/2 + z p(z))): the
  * leading term is exact, and the others, with their errors, are smaller (the form of fdlibm's log, Sun 1993).
- * p alone: <= 0.0468 u; log2(1 + f): <= 2.49 u */
-static inline double power_log2_of_parts(power_parts x)
+ * p alone: <= 0.0468 u */
+static inline double power_ln_of_sum(double x)
 {
-    const double s = x.f / (2.0 + x.f);
+    const double s = x / (2.0 + x);
     const double z = s * s, z2 = z * z;
-    const double half_square = 0.5 * x.f * x.f;
+    const double half_square = 0.5 * x * x;
     double p = 0.15055735214279847;
     p = p * z2 + (0.18184623792964741 + 0.15287466874348299 * z);
     p = p * z2 + (0.2857142894494975 + 0.22222177905332949 * z);
     p = p * z2 + (0.66666666666668672 + 0.39999999998509234 * z);
-    const double ln = x.f - (half_square - s * (half_square + z * p));
-    return x.k + ln * 1.4426950408889634;
+    return x - (half_square - s * (half_square + z * p));
+}
+
+/* log2 of 2^k (1 + f) <= 1                           error <= 2.78 u relative to the logarithm
+ * log2(1 + f) alone: <= 2.49 u */
+static inline double power_log2_of_parts(power_parts x)
+{
+    return x.k + power_ln_of_sum(x.f) * 1.4426950408889634;
 }
 
 /* log2(x), 0 <= x <= 1; -infinity for 0 */
@@ -126,20 +132,26 @@ static inline double log2_unit_with_complement(double x, double g)
     return x > 0.0 ? log2_x : -(double)INFINITY;
 }
 
-/* 2^y, y <= 0; 0 for y < -1022                         error <= 1.82 u
- * y = k + r with k the integer nearest to y, read off the low bits of y + 1.5 2^52, and added to the bits of
- * the exponent of 2^r = 1 + r ln 2 + r^2 q(r). For y below the range all of this is arbitrary: the select discards it.
- * The polynomial alone: <= 0.182 u */
-static inline double power_exp2(double y)
+/* 2^r - 1 = r ln 2 + r^2 q(r), |r| <= 1/2; of 2^r the polynomial alone errs by <= 0.182 u */
+static inline double power_exp2_minus_one(double r)
 {
-    const double shifted = y + 0x1.8p52;
-    const double r = y - (shifted - 0x1.8p52), r2 = r * r;
+    const double r2 = r * r;
     double q = 7.0725860902877691e-09 + 4.4566762559169464e-10 * r;
     q = q * r2 + (1.3215442587050853e-06 + 1.0178051723566915e-07 * r);
     q = q * r2 + (0.00015403530441737793 + 1.5252733853288374e-05 * r);
     q = q * r2 + (0.0096181291076068865 + 0.0013333558146395997 * r);
     q = q * r2 + (0.24022650695910097 + 0.055504108664821659 * r);
-    const double two_to_r = 1.0 + (0.69314718055994529 * r + r2 * q);
+    return 0.69314718055994529 * r + r2 * q;
+}
+
+/* 2^y, y <= 0; 0 for y < -1022                         error <= 1.82 u
+ * y = k + r with k the integer nearest to y, read off the low bits of y + 1.5 2^52, and added to the bits of
+ * the exponent of 2^r. For y below the range all of this is arbitrary: the select discards it. */
+static inline double power_exp2(double y)
+{
+    const double shifted = y + 0x1.8p52;
+    const double r = y - (shifted - 0x1.8p52);
+    const double two_to_r = 1.0 + power_exp2_minus_one(r);
     const uint64_t bits = power_bits(two_to_r) + (power_bits(shifted) << 52);
     return y < -1022.0 ? 0.0 : power_from_bits(bits);
 }
@@ -212,19 +224,25 @@ static inline power_partsf power_split_one_minusf(float g)
     return parts;
 }
 
-/* log2 of 2^k (1 + f) <= 1                           error <= 2.85 u relative to the logarithm
+/* ln(1 + f), 11/16 <= 1 + f < 11/8
  * s = f / (2 + f) and z = s^2 give ln(1 + f) = 2 atanh(s) = 2 s + s z p(z) = f - (f^2/2 - s (f^2/2 + z p(z))): the
  * leading term is exact, and the others, with their errors, are smaller (the form of fdlibm's log, Sun 1993).
- * p alone: <= 0.0258 u; log2(1 + f): <= 2.57 u */
-static inline float power_log2_of_partsf(power_partsf x)
+ * p alone: <= 0.0258 u */
+static inline float power_ln_of_sumf(float x)
 {
-    const float s = x.f / (2.0f + x.f);
+    const float s = x / (2.0f + x);
     const float z = s * s, z2 = z * z;
-    const float half_square = 0.5f * x.f * x.f;
+    const float half_square = 0.5f * x * x;
     float p = 0.300949514f;
     p = p * z2 + (0.666668415f + 0.399692833f * z);
-    const float ln = x.f - (half_square - s * (half_square + z * p));
-    return x.k + ln * 1.44269502f;
+    return x - (half_square - s * (half_square + z * p));
+}
+
+/* log2 of 2^k (1 + f) <= 1                           error <= 2.85 u relative to the logarithm
+ * log2(1 + f) alone: <= 2.57 u */
+static inline float power_log2_of_partsf(power_partsf x)
+{
+    return x.k + power_ln_of_sumf(x.f) * 1.44269502f;
 }
 
 /* log2(x), 0 <= x <= 1; -infinity for 0 */
@@ -256,18 +274,24 @@ static inline float log2_unit_with_complementf(float x, float g)
     return x > 0.0f ? log2_x : -(float)INFINITY;
 }
 
-/* 2^y, y <= 0; 0 for y < -126                         error <= 1.77 u
- * y = k + r with k the integer nearest to y, read off the low bits of y + 1.5 2^23, and added to the bits of
- * the exponent of 2^r = 1 + r ln 2 + r^2 q(r). For y below the range all of this is arbitrary: the select discards it.
- * The polynomial alone: <= 0.138 u */
-static inline float power_exp2f(float y)
+/* 2^r - 1 = r ln 2 + r^2 q(r), |r| <= 1/2; of 2^r the polynomial alone errs by <= 0.138 u */
+static inline float power_exp2_minus_onef(float r)
 {
-    const float shifted = y + 0x1.8p23f;
-    const float r = y - (shifted - 0x1.8p23f), r2 = r * r;
+    const float r2 = r * r;
     float q = 0.000154697511f;
     q = q * r2 + (0.00961803086f + 0.00133908668f * r);
     q = q * r2 + (0.240226507f + 0.0555035695f * r);
-    const float two_to_r = 1.0f + (0.693147182f * r + r2 * q);
+    return 0.693147182f * r + r2 * q;
+}
+
+/* 2^y, y <= 0; 0 for y < -126                         error <= 1.77 u
+ * y = k + r with k the integer nearest to y, read off the low bits of y + 1.5 2^23, and added to the bits of
+ * the exponent of 2^r. For y below the range all of this is arbitrary: the select discards it. */
+static inline float power_exp2f(float y)
+{
+    const float shifted = y + 0x1.8p23f;
+    const float r = y - (shifted - 0x1.8p23f);
+    const float two_to_r = 1.0f + power_exp2_minus_onef(r);
     const uint32_t bits = power_bitsf(two_to_r) + (power_bitsf(shifted) << 23);
     return y < -126.0f ? 0.0f : power_from_bitsf(bits);
 }

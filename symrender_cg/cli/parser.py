@@ -17,14 +17,15 @@ SCENE_HELP = "a built-in scene's name or a TOML file; Chapter 1's scene if left 
 _DESCRIPTION = """\
 A scene becomes its image as one formula, the formula readable C99, the C99 a native kernel.
 
-Exit codes: 0 done, 2 usage or scene, 3 outside what a plan covers, 4 a stated bound broken, 5 no compiler or a failed
-compilation, 130 interrupted."""
+Exit codes: 0 done, 2 usage or scene, 3 outside what a plan covers, 4 a stated bound broken or a certificate that cannot
+be given, 5 no compiler or a failed compilation, 130 interrupted."""
 
 _EXAMPLES = """\
 examples:
   python -m symrender_cg build                          Chapter 1's kernels as C under generated/, compiled
   python -m symrender_cg render -o sphere.png           its image
   python -m symrender_cg render scene.toml -o out.png --size 800x600
+  python -m symrender_cg render -o sphere.png --accuracy certified --target uint8
   python -m symrender_cg explain off_axis               the plan and the derivation
   python -m symrender_cg explain mirrors --ablate       what each effect costs
   python -m symrender_cg check                          the kernels against numpy and the oracle
@@ -40,12 +41,14 @@ Derives the image of a scene, writes its kernel as C99 under DIR, and compiles i
 
 To compile the C yourself, add both folders to the include path. What is up to date is not touched: a second run derives
 and compiles nothing. The kernel is the one for any window. A scene of many spheres has no kernel of accuracy literal,
-which is the formula of one sphere, and none that is baked: its kernel loops over arrays."""
+which is the formula of one sphere, and none that is baked: its kernel loops over arrays. Of one sphere, stable and
+certified have kernels that bound their own error; of many, both rest on one kernel that encloses intensities."""
 _BUILD_EXAMPLES = """\
 examples:
   python -m symrender_cg build
   python -m symrender_cg build scene.toml --accuracy double --passes
   python -m symrender_cg build --accuracy double --bake     the scene's numbers folded into the C
+  python -m symrender_cg build --accuracy certified --target uint8
   python -m symrender_cg build mirrors                      the kernels of a scene of many spheres
 """
 
@@ -55,7 +58,7 @@ Renders a scene to an image file; its extension chooses the format.
     .png   grey, cut to [0, 1]; --bits 8 (default) or 16
            --encoding srgb (default): the transfer curve of IEC 61966-2-1, declared by an sRGB chunk in the file
            --encoding linear: grey levels proportional to intensity, declared by a gAMA chunk of 1.0
-    .npy   the array of linear intensities, float64 (float32 with --accuracy single)
+    .npy   the array of linear intensities, float64 (float32 with --accuracy fast or single)
     .npz   the same under the name `image`, with every layer that --layers names
     .pfm   linear intensities as float32, little endian, rows from bottom to top
 
@@ -67,20 +70,28 @@ image, out-depth.png, out-normal.png, ...:
     index    which sphere, then the plane; as a .png a colour each
     terms    background, ambient, diffuse and specular of each light, reflected: they add up to the image
 
+--accuracy stable proves every value to be within 4 ulp, certified proves each to be the nearest float64, float32 or
+grey level, whichever --target names; both print how many pixels each stage settled. Grey levels are written as they
+are: a .png of them is 8 bit linear. Where a tie cannot be decided the pixels are named, exit code 4, and nothing is
+written.
+
 Every file is written whole or not at all."""
 _RENDER_EXAMPLES = """\
 examples:
   python -m symrender_cg render -o sphere.png
   python -m symrender_cg render scene.toml -o out.png --size 1920x1080 --bits 16 --encoding linear
   python -m symrender_cg render off_axis -o field.npy --no-clip
+  python -m symrender_cg render -o levels.png --accuracy certified --target uint8
   python -m symrender_cg render mirrors -o out.png --layers depth,normal,index,terms
   python -m symrender_cg render --list
 """
 
 _EXPLAIN = """\
 Prints what a kernel rests on: the effects that are in and the proof of each one left out, every named quantity with its
-formula and source, the forms that the accuracy chose, the invariants that sympy proved, the silhouette, and operations
-per stage. Of a scene of many spheres: the plan, what the kernel loops over, and the parts that its loops are made of.
+formula and source, the forms that the accuracy chose, the number format of each quantity, the invariants that sympy
+proved, the silhouette, and operations per stage; of stable and certified also the stages that prove a value, with the
+bound of their kernel for an image of --size. Of a scene of many spheres: the plan, what the kernel loops over, and the
+parts that its loops are made of.
 
 The plan is that of an image of the shape --size; what is outside such a window is left out.
 
@@ -92,6 +103,7 @@ _EXPLAIN_EXAMPLES = """\
 examples:
   python -m symrender_cg explain
   python -m symrender_cg explain off_axis --accuracy single
+  python -m symrender_cg explain --accuracy certified --target uint8
   python -m symrender_cg explain mirrors --findings shadow
   python -m symrender_cg explain mirrors --ablate --size 512x512
   python -m symrender_cg explain --latex > derivation.tex     a document that pdflatex compiles as it is
@@ -101,8 +113,8 @@ _CHECK = """\
 Compares each compiled kernel with the oracle (exact arithmetic and Arb balls, correctly rounded), with vectorised numpy
 and with the per-pixel loop: on the pixel centres of a whole image, and on points near the silhouette, the terminator
 and the highlight; of a scene of many spheres with brute force in numpy, and on points near outlines, mirrored outlines
-and shadows. Errors are those of the unclipped field. Exit code 4 when a stated bound is broken, or another surface is
-seen than the oracle's."""
+and shadows. Errors are those of the unclipped field; certified is compared as float64. Exit code 4 when a stated bound
+is broken, or another surface is seen than the oracle's."""
 _CHECK_EXAMPLES = """\
 examples:
   python -m symrender_cg check

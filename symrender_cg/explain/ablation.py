@@ -35,7 +35,7 @@ from symrender_cg.scene import Scene
 
 ROUNDS: Final = 9
 OTHER_FORMULAS: Final = frozenset({"off_axis", "front_test"})
-ROUNDING: Final = {"double": 1e-13, "single": 1e-5}
+ROUNDING: Final = {"double": 1e-13, "single": 1e-5, "fast": 2.0**-11}
 """Stated bound on the error of a value not above 1, see symrender_cg.reference.check_scene."""
 _COMPILING_THREADS: Final = max(2, os.cpu_count() or 1)
 

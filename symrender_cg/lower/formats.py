@@ -38,7 +38,6 @@ from symrender_cg.lower.nodes import (
 )
 from symrender_cg.lower.program import RATES, Format, KernelProgram, Rate, Step
 
-
 WIDE: tuple[Format, ...] = ("double_double", "pair")
 """Formats whose numbers are hi + lo; both are of the C type double_double."""
 

@@ -1,7 +1,8 @@
 """Ranges: a kernel's own steps, evaluated once a frame over all pixels that hit, bound how far its values may be off.
 
-    n_x = inv_d2 * (a - b)        ->  n_x = range_within(range_product(FLOAT64, inv_d2, range_difference(FLOAT64, a, b)), -1, 1)
-    w2 = pair_add(p, q)           ->  w2 = range_within(range_sum(PAIR, p, q), light_gap2, INFINITY)
+    n_x = inv_d2 * (a - b)    ->  n_x = range_within(range_product(FLOAT64, inv_d2, range_difference(FLOAT64, a, b)),
+                                                     -1, 1)
+    w2 = pair_add(p, q)       ->  w2 = range_within(range_sum(PAIR, p, q), light_gap2, INFINITY)
 
 Comes in: a `KernelProgram` whose formats are converted. Goes out: steps of the format "range" (range.h), each the bound
 of the definition of the same name: its operations in their order, each with the error of its own format. What the

@@ -17,6 +17,7 @@ n to 100,000, d from 0.001 to 10,000; a 24 x 24 image and 120 points near each h
 these parts of the bound, and no hit or miss was wrong:
 
     accuracy    bound for Chapter 1's scene    largest error there    largest part of the bound, random scenes
+    fast        6.4e-4                         7.2e-5                 0.18 (over 420 scenes, 60 points each)
     double      2.6e-15                        1.1e-15                0.56
     single      1.4e-6                         3.7e-7                 0.58
     literal     none                           0.61 (wrong hits)      -

@@ -71,13 +71,13 @@ def bind(
 ) -> Drawing:
     """A kernel and a plan that it was made for, with the numbers of the plan's scene."""
     if isinstance(kernel, SceneKernel):
-        numbers: Any = _prepared(kernel, _Same(plan), width, height, pixel, white)
+        numbers: Any = _prepared(kernel, SamePlan(plan), width, height, pixel, white)
     else:
         numbers = kernel.numbers(numbers_of(plan.scene))
     return Drawing(plan, kernel, numbers, pixel, white)
 
 
-class _Same:
+class SamePlan:
     """A plan as the key of a cache: equal to itself alone, so that no scene is compared with another."""
 
     __slots__ = ("plan",)
@@ -86,20 +86,20 @@ class _Same:
         self.plan = plan
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.plan is self.plan
+        return isinstance(other, SamePlan) and other.plan is self.plan
 
     def __hash__(self) -> int:
         return id(self.plan)
 
 
 @lru_cache(maxsize=8)
-def _prepared(kernel: SceneKernel, same: _Same, width: int, height: int, pixel: float, white: float) -> Prepared:
+def _prepared(kernel: SceneKernel, same: SamePlan, width: int, height: int, pixel: float, white: float) -> Prepared:
     """The tables of a scene, remembered: a scene is drawn more than once, and threads may share them."""
     return kernel.prepare(_numbers(same, kernel.channels), width=width, height=height, pixel=pixel, white=white)
 
 
 @lru_cache(maxsize=8)
-def _numbers(same: _Same, channels: int) -> dict[str, Any]:
+def _numbers(same: SamePlan, channels: int) -> dict[str, Any]:
     found = same.plan.arrangement
     assert found is not None, "a kernel of scenes is for plans with an arrangement"
     return scene_numbers(same.plan.scene, found, channels)

@@ -7,6 +7,7 @@ Comes in: a plan with an arrangement, points of the image plane. Goes out: Enclo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -66,7 +67,7 @@ class EnclosureKernel:
         columns, rows = np.ascontiguousarray(given_x).reshape(-1), np.ascontiguousarray(given_y).reshape(-1)
         count = columns.size
         hi, lo, error = (np.empty((count, self.channels)) for _ in range(3))
-        scene, keeps = self._scene()
+        scene, keeps = _structure(self)
         entry = getattr(self.library.lib, f"{self.name}_points")
         as_pointer = self.library.ffi.cast
 
@@ -88,17 +89,19 @@ class EnclosureKernel:
         frame = self.plan.scene
         return scene_numbers(frame, found, self.channels) | exact_numbers(frame, nearer=self.nearer)
 
-    def _scene(self) -> tuple[Any, tuple[Any, ...]]:
-        """The scene as C sees it, and the arrays that it refers to."""
-        ffi, numbers = self.library.ffi, self.numbers()
-        scene = ffi.new(f"{self.name}_scene *")
-        keeps: list[Any] = []
-        for name, shape in self.fields:
-            value = numbers[name]
-            if shape in ("reals", "wholes"):
-                array = np.ascontiguousarray(value, dtype=np.float64 if shape == "reals" else np.int32)
-                keeps.append(array)
-                setattr(scene, name, ffi.cast("double *" if shape == "reals" else "int *", array.ctypes.data))
-            else:
-                setattr(scene, name, value)
-        return scene, tuple(keeps)
+
+@lru_cache(maxsize=8)
+def _structure(kernel: EnclosureKernel) -> tuple[Any, tuple[Any, ...]]:
+    """The scene as C sees it, and the arrays that it refers to; remembered: a scene is asked about more than once."""
+    ffi, numbers = kernel.library.ffi, kernel.numbers()
+    scene = ffi.new(f"{kernel.name}_scene *")
+    keeps: list[Any] = []
+    for name, shape in kernel.fields:
+        value = numbers[name]
+        if shape in ("reals", "wholes"):
+            array = np.ascontiguousarray(value, dtype=np.float64 if shape == "reals" else np.int32)
+            keeps.append(array)
+            setattr(scene, name, ffi.cast("double *" if shape == "reals" else "int *", array.ctypes.data))
+        else:
+            setattr(scene, name, value)
+    return scene, tuple(keeps)

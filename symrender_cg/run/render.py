@@ -57,7 +57,7 @@ def render_image(
     backend    "native", or "numpy", which needs no compiler (by hand-written numpy, slower)
     cache      folder for compiled kernels; by default SYMRENDER_CACHE_DIR, or the user's cache folder
 
-    Raises ArgumentError, SceneError, OutsidePlanError or ToolchainError, and AccuracyError where a certificate cannot be
+    Raises ArgumentError, SceneError, OutsidePlanError or ToolchainError, and AccuracyError where no certificate can be
     given, see symrender_cg.errors.
     """
     width, height = _side("width", width), _side("height", height)
@@ -176,7 +176,7 @@ def evaluate(
     The plane passes through the point looked at, x to the right and y upwards. On the pixel centres of an image the
     values are those of `render_image`, bit for bit. Arguments as there, but `clip` is off by default.
 
-    with_bound    (values, bounds): of each value a float64 that its error does not exceed, proved; whatever the accuracy
+    with_bound    (values, bounds): of each value a float64 that its error does not exceed, proved; for any accuracy
 
     Raises ArgumentError for points that are not finite real numbers.
     """

@@ -1,4 +1,4 @@
-"""Settling enclosures: what hi, lo, error say of the rounding of the true value, by numpy, for the few points left over.
+"""Settling enclosures: what hi, lo, error say of the rounding of the true value, by numpy.
 
 Comes in: an `Enclosure` and what is to be settled. Goes out: values, and where they are settled. Never done here: a
 guess; what is not settled is somebody else's.
@@ -18,7 +18,7 @@ FOUR_ULP = 2.0**-52
 
 
 def settled(found: Enclosure, rule: str) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """The values by the rule "ulp", "float64", "float32" or "uint8", and whether they are settled; shapes of `found`."""
+    """The values by the rule "ulp", "float64", "float32" or "uint8", and whether they are settled."""
     return _RULES[rule](found)
 
 

@@ -1,4 +1,4 @@
-"""`SettlingKernel`: a kernel of one sphere that bounds its own error, and says which values its bound does not settle."""
+"""`SettlingKernel`: a kernel of one sphere that bounds its own error, and says what that does not settle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.run.kernel import Kernel
-
 
 _KEPT = 1 << 20
 """Places that a thread keeps memory for: fresh memory costs more than a kernel's work on it."""
@@ -69,7 +68,7 @@ class SettlingKernel(Kernel):
         return left_over[:found].copy()
 
     def enclose(self, x: NDArray[np.float64], y: NDArray[np.float64], numbers: Any) -> tuple[NDArray[np.float64], ...]:
-        """(hi, lo, error) at contiguous points: |true value - (hi + lo)| <= error, which is inf where nothing is known."""
+        """(hi, lo, error) at contiguous points: |true value - (hi + lo)| <= error, inf if nothing is known."""
         ffi = self.library.ffi
         found = tuple(np.empty(x.shape) for _ in range(3))
         pointers = [ffi.cast("double *", a.ctypes.data) for a in (*found, x, y)]

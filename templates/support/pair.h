@@ -1,11 +1,12 @@
 /* Pairs: double-doubles that nobody renormalises. A pair is the unevaluated sum hi + lo where lo collects what the
  * operations on hi rounded away, to first order. A pair costs half of a double-double and vectorises as well.
  *
- * hi is computed as plain float64 would; each lo is that operation's exact rounding error, plus the operands' lo carried
- * along, in float64. What is lost is of second order: with u = 2^-53 and L a bound on |lo| of an operand, each comment
- * states a bound of the loss. range.h counts it, once a frame, so that a kernel knows how good its pairs are.
- * Nothing is assumed of the operands but that |lo| is small beside the largest |hi| that led to it; after a cancellation
- * lo may be larger than hi, and the pair is still right. Underflow aside, as in double_double.h.
+ * hi is computed as plain float64 would; each lo is that operation's exact rounding error, plus the operands' lo
+ * carried along, in float64. What is lost is of second order: with u = 2^-53 and L a bound on |lo| of an operand,
+ * each comment states a bound of the loss. range.h counts it, once a frame, so that a kernel knows how good its pairs
+ * are.
+ * Nothing is assumed of the operands but that |lo| is small beside the largest |hi| that led to it; after a
+ * cancellation lo may be larger than hi, and the pair is still right. Underflow aside, as in double_double.h.
  *
  * Source   Lange, Rump, "Faithfully rounded floating-point computations", ACM TOMS 46(3), 2020 (pair arithmetic)
  */

@@ -1,5 +1,5 @@
-/* Ranges: what is known of a quantity before a frame is drawn. A kernel evaluates its own steps once in ranges, over all
- * the pixels that hit, and so learns how far any pixel's computed value can be from the true one.
+/* Ranges: what is known of a quantity before a frame is drawn. A kernel evaluates its own steps once in ranges, over
+ * all the pixels that hit, and so learns how far any pixel's computed value can be from the true one.
  *
  * Of the true value v, and of the number c that the kernel computes for it (for double-doubles and pairs c = hi + lo):
  *     least <= v <= most
@@ -220,8 +220,8 @@ static inline range range_sum(number_format format, range a, range b)
         sum.relative += RANGE_U * RANGE_U;
         if (same) {
             sum.relative += 2.0 * RANGE_U * range_larger(a.low_relative, b.low_relative) * (1.0 + sum.relative);
-            sum.absolute += 2.0 * RANGE_U
-                            * (a.low + b.low + range_larger(a.low_relative, b.low_relative) * (range_bound(a) + range_bound(b)));
+            const double low_relative = range_larger(a.low_relative, b.low_relative);
+            sum.absolute += 2.0 * RANGE_U * (a.low + b.low + low_relative * (range_bound(a) + range_bound(b)));
         } else {
             sum.absolute += RANGE_U * (2.0 * range_low(a) + 2.0 * range_low(b) + RANGE_U * range_bound(sum));
         }
@@ -246,7 +246,7 @@ static inline range range_difference_in_order(range a, range b)
 }
 
 /* What pair_mul loses: L_a L_b + u (3 |a.hi| L_b + 3 |b.hi| L_a + 3 u |a.hi b.hi|) at most, and the lo that it leaves,
- * a.hi b.lo + a.lo b.hi and a rounding; |a.hi| <= |a| + L_a. */
+ * a.hi b.lo + a.lo b.hi and a rounding; |a.hi| <= |a| + L_a, and |a b| is less than |c| by no more than the losses. */
 static inline range range_pair_product(range product, range a, range b)
 {
     const double la = a.low_relative, lb = b.low_relative, u = RANGE_U;
@@ -255,10 +255,10 @@ static inline range range_pair_product(range product, range a, range b)
     const double rest = range_rest(product) + range_times(product.relative, range_size(product));
     product.relative += relative;
     product.absolute += relative * rest + range_times(a.low, range_low(b)) + range_times(b.low, range_times(la, high_a))
-                        + 3.0 * u * (range_times(high_a, b.low) + range_times(high_b, a.low) + range_times(a.low, u * high_b)
-                                     + range_times(b.low, u * high_a));
-    product.low_relative = (la * (1.0 + lb) + lb * (1.0 + la) + u) * (1.0 + 8.0 * u);
-    product.low = (range_times(high_a, b.low) + range_times(high_b, a.low)) * (1.0 + 8.0 * u);
+                        + 3.0 * u * (1.0 + u) * (range_times(high_a, b.low) + range_times(high_b, a.low));
+    const double apart = (1.0 + la) * (1.0 + la) * (1.0 + lb) * (1.0 + lb) * (1.0 + 8.0 * u);
+    product.low_relative = (la * (1.0 + lb) + lb * (1.0 + la) + u) * apart;
+    product.low = (range_times(high_a, b.low) + range_times(high_b, a.low)) * apart;
     return product;
 }
 
@@ -325,7 +325,7 @@ static inline range range_inverse(number_format format, range a)
             return unknown;
         }
         inverse.relative += (t + RANGE_U) * (t + 5.0 * RANGE_U) / ((1.0 - t) * (1.0 - t)) * (1.0 + inverse.relative);
-        inverse.low_relative = t / (1.0 - t) + 2.0 * RANGE_U;
+        inverse.low_relative = t / (1.0 - 2.0 * t) + 2.0 * RANGE_U;
     }
     return range_rounded(format, inverse);
 }
@@ -358,7 +358,7 @@ static inline range range_root(number_format format, range a)
             return unknown;
         }
         root.relative += (t + RANGE_U) * (t + 5.0 * RANGE_U) / ((1.0 - t) * (1.0 - t)) * (1.0 + root.relative);
-        root.low_relative = t / (1.0 - t) + 2.0 * RANGE_U;
+        root.low_relative = t / (1.0 - 2.0 * t) + 2.0 * RANGE_U;
     }
     return range_rounded(format, root);
 }
@@ -367,9 +367,7 @@ static inline range range_root(number_format format, range a)
 static inline range range_positive_part(range a)
 {
     if (a.least < 0.0) {
-        a.absolute += a.root * a.root;
-        if (!(a.relative < 1.0))
-            a.absolute = INFINITY;
+        a.absolute = a.relative < 0.5 ? a.absolute + 2.0 * a.root * a.root : INFINITY;
     }
     a.least = range_larger(0.0, a.least);
     a.most = range_larger(0.0, a.most);
@@ -382,7 +380,7 @@ static inline range range_positive_part(range a)
  *               2 p sqrt(s) e^(-p s) <= 0.86 sqrt(p)
  *   c < 0.52    n >= 2: a relative error r counts p 0.52^p r <= 0.63 r; one of sqrt(c) 1.9 times, an absolute one
  *               1.2 times; and where r.v < 0 the same power stands for 0, from which it differs by the errors squared
- *               n < 2: by the mean value, as c >= cos2.least > 0 and r.v is clear of 0; c moves by less than a quarter */
+ *               n < 2: by the mean value, as c >= cos2.least > 0, r.v is clear of 0, and c moves by less than 1/4 c */
 static inline range range_power_of_cosine(number_format format, range cos2, range sin2, range exponent,
     double own_relative, double own_absolute)
 {

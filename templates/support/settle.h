@@ -1,4 +1,4 @@
-/* Settling: a value that is known up to a bound is the rounding of the true value if both ends of the bound round alike. */
+/* Settling: a value that is known up to a bound is settled where both ends of the bound round alike. */
 #ifndef SYMRENDER_SETTLE_H
 #define SYMRENDER_SETTLE_H
 

@@ -116,7 +116,7 @@ def _mirrored_ray(program: ImageProgram) -> tuple[Definition, ...]:
 
 
 def _complement(_: ImageProgram) -> tuple[Definition, ...]:
-    meaning = "1 - (r.v)^2 as a difference: cos2 is known far beyond float64"
+    meaning = "1 - (r.v)^2 as a difference: what cancels is paid for"
     return (Definition("sin2", 1 - S("cos2"), _SPECULAR, meaning),)
 
 
@@ -198,7 +198,7 @@ FORMS: tuple[Form, ...] = (
     Form(
         "complement",
         _complement,
-        "the nine products of w x mirror, where numbers are pairs",
+        "the nine products of w x mirror, where what 1 - cos2 cancels is paid for: in pairs, or by a bound",
         "sin^2 + cos^2 = 1",
         _complement_claims,
         brings=("specular",),
