@@ -1,9 +1,9 @@
 """`python -m benchmarks levels`: what each accuracy costs, and what it delivers, scene by scene.
 
 Comes in: built-in names or files, a size, rounds. Goes out: Report and its table: nanoseconds a pixel of render_image
-at every level that the scene can have, its ratio to `double`, the largest error against the oracle over seeded pixels of
-the unclipped field, and for levels that prove their values which stage settled how many pixels, with which bound. All
-levels of a scene take turns in one run, on one thread. Never done here: a peer.
+at every level that the scene can have, its ratio to `double`, the largest error against the oracle over seeded pixels
+of the unclipped field, and for levels that prove their values which stage settled how many pixels, with which bound.
+All levels of a scene take turns in one run, on one thread. Never done here: a peer.
 """
 
 from __future__ import annotations

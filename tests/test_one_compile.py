@@ -12,6 +12,7 @@ from symrender_cg import evaluate, render_image
 from symrender_cg.build import Cache
 from symrender_cg.pipeline import build_kernel, compile_kernel, statistics, translate
 from symrender_cg.reference import oracle
+from symrender_cg.run.levels import hands_over
 from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere
 
 Counts = tuple[int, int, int, int]
@@ -51,9 +52,20 @@ def scenes_of_numbers(count: int, *, centred: bool) -> list[Scene]:
 @pytest.mark.parametrize("centred", [True, False])
 def test_a_hundred_scenes_that_differ_in_numbers_are_one_compile(tmp_path: Path, centred: bool) -> None:
     before = counts()
-    images = [render_image(scene, 9, 7, cache=tmp_path) for scene in scenes_of_numbers(100, centred=centred)]
+    scenes = scenes_of_numbers(100, centred=centred)
+    images = [render_image(scene, 9, 7, accuracy="single", cache=tmp_path) for scene in scenes]
     assert grown(before) == (1, 1, 0, 99)
     assert len({image.tobytes() for image in images}) == 100
+
+
+def test_a_hundred_scenes_at_double_are_two_compiles_at_most(tmp_path: Path) -> None:
+    """The kernel of double, and the compensated one that draws where plain float64 would not keep its promise."""
+    before = counts()
+    scenes = scenes_of_numbers(100, centred=True)
+    assert {hands_over(scene) for scene in scenes} == {True, False}
+    for scene in scenes:
+        render_image(scene, 9, 7, cache=tmp_path)
+    assert grown(before) == (2, 2, 0, 98)
 
 
 def test_a_moved_camera_and_a_moved_point_are_no_new_kernel(tmp_path: Path) -> None:

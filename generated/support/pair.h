@@ -2,8 +2,9 @@
  * operations on hi rounded away, to first order. A pair costs half of a double-double and vectorises as well.
  *
  * hi is computed as plain float64 would; each lo is that operation's exact rounding error, plus the operands' lo
- * carried along, in float64. What is lost is of second order: with u = 2^-53 and L a bound on |lo| of an operand, each comment
- * states a bound of the loss. range.h counts it, once a frame, so that a kernel knows how good its pairs are.
+ * carried along, in float64. What is lost is of second order: with u = 2^-53 and L a bound on |lo| of an operand,
+ * each comment states a bound of the loss. range.h counts it, once a frame, so that a kernel knows how good its pairs
+ * are.
  * Nothing is assumed of the operands but that |lo| is small beside the largest |hi| that led to it; after a
  * cancellation lo may be larger than hi, and the pair is still right. Underflow aside, as in double_double.h.
  *

@@ -246,7 +246,7 @@ static inline range range_difference_in_order(range a, range b)
 }
 
 /* What pair_mul loses: L_a L_b + u (3 |a.hi| L_b + 3 |b.hi| L_a + 3 u |a.hi b.hi|) at most, and the lo that it leaves,
- * a.hi b.lo + a.lo b.hi and a rounding; |a.hi| <= |a| + L_a. */
+ * a.hi b.lo + a.lo b.hi and a rounding; |a.hi| <= |a| + L_a, and |a b| is less than |c| by no more than the losses. */
 static inline range range_pair_product(range product, range a, range b)
 {
     const double la = a.low_relative, lb = b.low_relative, u = RANGE_U;
@@ -256,8 +256,9 @@ static inline range range_pair_product(range product, range a, range b)
     product.relative += relative;
     product.absolute += relative * rest + range_times(a.low, range_low(b)) + range_times(b.low, range_times(la, high_a))
                         + 3.0 * u * (1.0 + u) * (range_times(high_a, b.low) + range_times(high_b, a.low));
-    product.low_relative = (la * (1.0 + lb) + lb * (1.0 + la) + u) * (1.0 + 8.0 * u);
-    product.low = (range_times(high_a, b.low) + range_times(high_b, a.low)) * (1.0 + 8.0 * u);
+    const double apart = (1.0 + la) * (1.0 + la) * (1.0 + lb) * (1.0 + lb) * (1.0 + 8.0 * u);
+    product.low_relative = (la * (1.0 + lb) + lb * (1.0 + la) + u) * apart;
+    product.low = (range_times(high_a, b.low) + range_times(high_b, a.low)) * apart;
     return product;
 }
 
@@ -324,7 +325,7 @@ static inline range range_inverse(number_format format, range a)
             return unknown;
         }
         inverse.relative += (t + RANGE_U) * (t + 5.0 * RANGE_U) / ((1.0 - t) * (1.0 - t)) * (1.0 + inverse.relative);
-        inverse.low_relative = t / (1.0 - t) + 2.0 * RANGE_U;
+        inverse.low_relative = t / (1.0 - 2.0 * t) + 2.0 * RANGE_U;
     }
     return range_rounded(format, inverse);
 }
@@ -357,7 +358,7 @@ static inline range range_root(number_format format, range a)
             return unknown;
         }
         root.relative += (t + RANGE_U) * (t + 5.0 * RANGE_U) / ((1.0 - t) * (1.0 - t)) * (1.0 + root.relative);
-        root.low_relative = t / (1.0 - t) + 2.0 * RANGE_U;
+        root.low_relative = t / (1.0 - 2.0 * t) + 2.0 * RANGE_U;
     }
     return range_rounded(format, root);
 }
@@ -366,9 +367,7 @@ static inline range range_root(number_format format, range a)
 static inline range range_positive_part(range a)
 {
     if (a.least < 0.0) {
-        a.absolute += a.root * a.root;
-        if (!(a.relative < 1.0))
-            a.absolute = INFINITY;
+        a.absolute = a.relative < 0.5 ? a.absolute + 2.0 * a.root * a.root : INFINITY;
     }
     a.least = range_larger(0.0, a.least);
     a.most = range_larger(0.0, a.most);
