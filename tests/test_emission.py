@@ -267,18 +267,21 @@ def contexts(monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[str, Any]]:
         return render(self, *args, **kwargs)
 
     monkeypatch.setattr(jinja2.Template, "render", recorded)
+    translate(Scene.chapter1(), "stable")
     translate(Scene.chapter1(), "double")
     return seen
 
 
 def asked_for(name: str) -> set[str]:
-    """Keys that a template reads and does not define itself."""
+    """Keys that a template, or one that it includes, reads and does not define itself."""
     tree = c99.environment().parse((templates() / name).read_text(encoding="utf-8"))
+    included = {str(other) for other in meta.find_referenced_templates(tree)}
     own = {macro.name for macro in tree.find_all(jinja2.nodes.Macro)}
     own |= {
         entry.target.name for entry in tree.find_all(jinja2.nodes.Assign) if isinstance(entry.target, jinja2.nodes.Name)
     }
-    return meta.find_undeclared_variables(tree) - own
+    own |= {name for entry in tree.find_all(jinja2.nodes.FromImport) for name in entry.names if isinstance(name, str)}
+    return (meta.find_undeclared_variables(tree) - own).union(*map(asked_for, included))
 
 
 @pytest.mark.parametrize("key", ["name", "real", "baked"])
