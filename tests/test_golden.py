@@ -29,6 +29,7 @@ KERNELS = (
     ("chapter1", "double", None, False),
     ("chapter1", "double", None, True),
     ("chapter1", "stable", None, False),
+    ("chapter1", "certified", None, False),
     ("chapter1", "certified", "uint8", False),
     ("off_axis", "double", None, False),
     ("shadow", "double", None, False),

@@ -402,15 +402,17 @@ SYMRENDER_INLINE void keep_or_miss(block *b, int i, const sample *s, double back
 static ptrdiff_t settle(const block *b, int count, unsigned char *restrict out,
     ptrdiff_t first, ptrdiff_t *unsettled)
 {
-    unsigned char settled[POINTS];
-    int some = 0;
+    int settled[POINTS], some = 0;
+    int level[POINTS];   /* bytes later: a loop that writes them takes 64 points at a time, and has many left over */
     for (int i = 0; i < count; ++i) {
         const grey found = grey_level(b->value[i]);
         const int is_settled = (found.distance > 255.0 * b->error[i] + 0x1p-44) | (b->error[i] == 0.0);
-        out[i] = (unsigned char)found.level;
-        settled[i] = (unsigned char)is_settled;
+        level[i] = (int)found.level;
+        settled[i] = is_settled;
         some += !is_settled;
     }
+    for (int i = 0; i < count; ++i)
+        out[i] = (unsigned char)level[i];
     if (some == 0)
         return 0;
     ptrdiff_t listed = 0;

@@ -413,14 +413,13 @@ SYMRENDER_INLINE void keep_or_miss(block *b, int i, const sample *s, double back
 static ptrdiff_t settle(const block *b, int count, double *restrict out, double white,
     ptrdiff_t first, ptrdiff_t *unsettled)
 {
-    unsigned char settled[POINTS];
-    int some = 0;
+    int settled[POINTS], some = 0;
     for (int i = 0; i < count; ++i) {
         const double_double v = dd_sum(b->value[i], b->rest[i]);
         const int is_settled = is_within_four_ulp(
             v, b->error[i]);
         out[i] = v.hi > white ? white : v.hi;
-        settled[i] = (unsigned char)is_settled;
+        settled[i] = is_settled;
         some += !is_settled;
     }
     if (some == 0)

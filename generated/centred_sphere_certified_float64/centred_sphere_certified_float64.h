@@ -1,0 +1,58 @@
+/* centred_sphere_certified_float64: the image of one Phong-shaded sphere
+ * Accuracy "certified_float64" (symrender_cg 0.1.0)
+ * Generated from the formula; do not edit. Regenerate with:
+ *     python -m symrender_cg build chapter1 --accuracy certified
+ */
+#ifndef CENTRED_SPHERE_CERTIFIED_FLOAT64_H
+#define CENTRED_SPHERE_CERTIFIED_FLOAT64_H
+
+#include "grid.h"
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The scene in the camera's frame: eye at (0, 0, eye), image plane z = 0, view along -z. Lengths in scene units.
+ * 0 < radius, and the eye lies outside the sphere. */
+typedef struct {
+    double eye;             /* distance of the eye from the image plane */
+    double radius;          /* radius of the sphere */
+    double light_x;         /* position of the point light */
+    double light_y;         /* position of the point light */
+    double light_z;         /* position of the point light */
+    double light_intensity; /* intensity of the point light */
+    double k_ambient;       /* ambient coefficient */
+    double k_diffuse;       /* diffuse coefficient */
+    double k_specular;      /* specular coefficient */
+    double shininess;       /* exponent of the specular term */
+    double background;      /* intensity where no ray hits */
+} centred_sphere_certified_float64_scene;
+
+/* Writes rows [row_begin, row_end) of the image; row j starts at image + j * stride. Threads may share an image.
+ * Every pixel is what the accuracy promises, but for those whose numbers, row times width plus column, are written to
+ * `unsettled`, which has room for all of these rows' pixels. Returns how many those are. */
+ptrdiff_t centred_sphere_certified_float64_rows(
+    double *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_certified_float64_scene *scene,
+    int row_begin, int row_end, ptrdiff_t *unsettled);
+
+/* The same for points (x[i], y[i]) of the image plane; above white they are written as white. */
+ptrdiff_t centred_sphere_certified_float64_points(
+    double *values, const double *x, const double *y, ptrdiff_t count, double white,
+    const centred_sphere_certified_float64_scene *scene, ptrdiff_t *unsettled);
+
+/* The kernel's own values of points, hi + lo, and bounds of their errors: INFINITY where nothing is known. */
+void centred_sphere_certified_float64_enclose(
+    double *hi, double *lo, double *error, const double *x, const double *y, ptrdiff_t count,
+    const centred_sphere_certified_float64_scene *scene);
+
+/* How far the kernel's own value of any pixel that it settles can be from the true one. */
+double centred_sphere_certified_float64_bound(
+    const symrender_grid *grid, const centred_sphere_certified_float64_scene *scene);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
