@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from c_harness import COMPILERS, SnippetLibrary, compile_c
 from flint import fmpq
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 Ball = tuple[float, float, float]
@@ -326,6 +326,7 @@ balls = st.builds(lambda centre, error: (*centre, error), centres, radii)
 
 
 @settings(max_examples=60, deadline=None)
+@example(x=(262144.0, 1e-323, 1.0), y=(1.0, 0.0, 0.0), a=1.0, seed=0)
 @given(x=balls, y=balls, a=finite, seed=st.integers(0, 2**20))
 def test_no_balls_that_hypothesis_finds_break_an_enclosure(x: Ball, y: Ball, a: float, seed: int) -> None:
     draw = random.Random(seed)

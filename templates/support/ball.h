@@ -64,7 +64,7 @@ SYMRENDER_INLINE ball ball_ldexp(double a, int k)
 /* x 2^k: the low part and the radius may lose bits below 2^-1074 */
 SYMRENDER_INLINE ball ball_scaled(ball x, int k)
 {
-    const ball scaled = {ldexp(x.hi, k), ldexp(x.lo, k), ldexp(x.error, k) + BALL_FLOOR};
+    const ball scaled = {ldexp(x.hi, k), ldexp(x.lo, k), (ldexp(x.error, k) + BALL_FLOOR) * BALL_WIDER};
     return scaled;
 }
 
