@@ -30,8 +30,9 @@ ANSWERED = [case for case in CASES if case["status"] in ("ok", "miss") and case[
 
 def answers_are_settled(scene: Scene, x: Any, y: Any) -> None:
     answers = oracle.evaluate(scene, x, y)
-    for target, wanted in (("float64", answers.value), ("float32", answers.value32), ("uint8", answers.value8)):
-        found = oracle.settle(scene, x, y, target)  # type: ignore[arg-type]
+    rounded: tuple[Any, ...] = (answers.value, answers.value32, answers.value8)
+    for target, wanted in zip(oracle.TARGETS, rounded, strict=True):
+        found = oracle.settle(scene, x, y, target)
         assert found.dtype == wanted.dtype == np.dtype(target)
         np.testing.assert_array_equal(found, wanted, target)
 

@@ -50,7 +50,8 @@ UNIT_ROUNDOFF = {"double": 2.0**-53, "single": 2.0**-24, "fast": 2.0**-24}
 DOUBT = {"double": 1e-9, "single": 1e-4, "fast": 1e-4}
 """Margin of a decision below which the formats' roundings may take it either way."""
 EXACT_ORDER = frozenset({"double"})
-"""Accuracies that decide exactly which of two surfaces that cut each other is in front; all decide hit or miss so."""
+"""Accuracies of which another surface in front counts as wrong, never as in doubt: float64 tells all depths apart but
+those that agree to their last places. Hit or miss is exact at all of them."""
 ROUNDINGS = 16.0
 """How many roundings of a value one of its directions may cost."""
 HALVINGS = (4, 45)
