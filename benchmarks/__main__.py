@@ -6,19 +6,22 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
 
 import benchmarks
-from benchmarks import agreement, levels, random_scenes, scaling, scenes, speed, start
+from benchmarks import agreement, levels, random_scenes, roofline, scaling, scenes, speed, start
+from benchmarks.peers import chart, contest
+from benchmarks.peers import report as peers
 from symrender_cg.errors import SymrenderError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one benchmark; 0, or the exit code of what went wrong."""
     options = _parser().parse_args(argv)
-    console = Console() if sys.stdout.isatty() else Console(width=140)
+    console = Console() if sys.stdout.isatty() else Console(width=170)
     try:
         with Console(stderr=True).status("starting") as status:
             told: Callable[[str], None] = status.update
@@ -41,6 +44,8 @@ Report = (
     | random_scenes.Report
     | scenes.Report
     | levels.Report
+    | peers.Report
+    | roofline.Report
 )
 
 
@@ -59,10 +64,52 @@ def _measured(options: argparse.Namespace, told: Callable[[str], None]) -> Repor
         size, rounds, seed = options.size, options.rounds, options.seed
         return levels.measure_levels(options.scenes, size, rounds, options.points, seed, told)
     if options.command == "scaling":
-        counts = options.counts or (scaling.QUICK_COUNTS if options.quick else scaling.COUNTS)
-        rounds = options.rounds or (3 if options.quick else 9)
-        return scaling.measure_scaling(counts, options.size, rounds, options.seed, told)
+        return scaling.measure_all(_scaling_plan(options), told)
+    if options.command == "peers":
+        return _peers(options, told)
+    if options.command == "roofline":
+        return _roofline(options, told)
     return speed.measure_speed(options.size, options.rounds, options.shininess, options.points, options.seed, told)
+
+
+def _peers(options: argparse.Namespace, told: Callable[[str], None]) -> peers.Report:
+    if options.plot:
+        chart.require_chart(options.plot)
+    plan = contest.Plan.quick(options.seed) if options.quick else contest.Plan(seed=options.seed)
+    plan = replace(
+        plan,
+        size=options.size or plan.size,
+        rounds=options.rounds or plan.rounds,
+        points=options.points or plan.points,
+        threads=tuple(options.threads or plan.threads),
+    )
+    found = contest.measure_peers(plan, told)
+    if options.plot:
+        chart.draw_chart(found, options.plot)
+    return found
+
+
+def _roofline(options: argparse.Namespace, told: Callable[[str], None]) -> roofline.Report:
+    if options.plot:
+        chart.require_chart(options.plot)
+    found = roofline.measure_roofline(options.sizes, options.rounds, options.seed, told)
+    if options.plot:
+        roofline.draw_chart(found, options.plot)
+    return found
+
+
+def _scaling_plan(options: argparse.Namespace) -> scaling.Plan:
+    kinds = tuple(options.kinds or scaling.KINDS)
+    plan = scaling.Plan.quick(kinds, options.size, options.seed)
+    if not options.quick:
+        plan = scaling.Plan(kinds, size=options.size, seed=options.seed)
+    return replace(
+        plan,
+        counts=tuple(options.counts or plan.counts),
+        lights=tuple(options.lights or plan.lights),
+        sizes=tuple(options.sizes or plan.sizes),
+        rounds=options.rounds or plan.rounds,
+    )
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -80,16 +127,19 @@ def _parser() -> argparse.ArgumentParser:
     first = commands.add_parser("start", help="seconds from the start of a process to its first image")
     first.add_argument("--size", type=_count, default=256, help="side of the image (256)")
     first.add_argument("--rounds", type=_count, default=7, help="processes of each case (7)")
-    peers = commands.add_parser("agreement", help="pictures and geometry beside POV-Ray's and Mitsuba's")
-    peers.add_argument("scenes", nargs="*", help="built-in names or TOML files (all built-in scenes)")
-    peers.add_argument("--size", type=_count, default=512, help="side of the image (512)")
-    peers.add_argument("--rounds", type=_count, default=5, help="samples of each time (5)")
-    peers.add_argument("--out", type=Path, help="folder for pictures: ours, the peer's, 100 times the difference")
-    many = commands.add_parser("scaling", help="milliseconds against the number of spheres, beside POV-Ray and Mitsuba")
+    others = commands.add_parser("agreement", help="pictures and geometry beside POV-Ray's and Mitsuba's")
+    others.add_argument("scenes", nargs="*", help="built-in names or TOML files (all built-in scenes)")
+    others.add_argument("--size", type=_count, default=512, help="side of the image (512)")
+    others.add_argument("--rounds", type=_count, default=5, help="samples of each time (5)")
+    others.add_argument("--out", type=Path, help="folder for pictures: ours, the peer's, 100 times the difference")
+    many = commands.add_parser("scaling", help="times against numbers of spheres, lights and pixels; compile times")
+    many.add_argument("kinds", nargs="*", metavar="KIND", type=_kind, help=f"{', '.join(scaling.KINDS)} (all)")
     many.add_argument("--counts", type=_count, nargs="+", help="numbers of spheres (1 10 100 1000 10000)")
-    many.add_argument("--size", type=_count, default=512, help="side of the image (512)")
+    many.add_argument("--lights", type=_count, nargs="+", help="numbers of lights (1 2 4 8 16 32)")
+    many.add_argument("--sizes", type=_count, nargs="+", help="sides of the images (64 and its doubles up to 8192)")
+    many.add_argument("--size", type=_count, default=512, help="side of the image with many spheres or lights (512)")
     many.add_argument("--rounds", type=_count, help="samples of each contestant (9)")
-    many.add_argument("--quick", action="store_true", help="to 100 spheres in 3 rounds")
+    many.add_argument("--quick", action="store_true", help="to 100 spheres, 8 lights, 2048 x 2048, in 3 rounds")
     effects = commands.add_parser("scenes", help="each scene with its plan and with every effect forced in")
     effects.add_argument("scenes", nargs="*", help="built-in names or TOML files (all built-in scenes)")
     effects.add_argument("--size", type=_count, default=512, help="side of the image (512)")
@@ -104,10 +154,27 @@ def _parser() -> argparse.ArgumentParser:
     truth.add_argument("--width", type=_count, default=24, help="pixels of a row (24)")
     truth.add_argument("--height", type=_count, default=20, help="rows of an image (20)")
     truth.add_argument("--jobs", type=_count, help="processes (one for each processor)")
-    for command in (fast, first, peers, many, effects, costs, truth):
+    rivals = commands.add_parser("peers", help="ns a pixel and errors beside numba, JAX, Dr.Jit, Halide and others")
+    rivals.add_argument("--quick", action="store_true", help="512 x 512, one thread, 5 rounds: under two minutes")
+    rivals.add_argument("--size", type=_count, help="side of the image (1024)")
+    rivals.add_argument("--rounds", type=_count, help="samples of each contestant (15)")
+    rivals.add_argument("--threads", type=_count, nargs="+", help="numbers of threads (1, and one a processor)")
+    rivals.add_argument("--points", type=_count, help="most pixels to compare with the oracle (16384)")
+    rivals.add_argument("--plot", type=Path, metavar="FILE", help="chart of error against time, .png or .svg")
+    roof = commands.add_parser("roofline", help="operations and bytes of the kernels beside the machine's peaks")
+    roof.add_argument("--sizes", type=_count, nargs="+", default=[128, 512, 4096], help="sides (128 512 4096)")
+    roof.add_argument("--rounds", type=_count, default=9, help="samples of each time (9)")
+    roof.add_argument("--plot", type=Path, metavar="FILE", help="chart of the roofline, .png or .svg")
+    for command in (fast, first, others, many, effects, costs, truth, rivals, roof):
         command.add_argument("--seed", type=int, default=1, help="seed of the order of turns and of the pixels (1)")
         command.add_argument("--json", action="store_true", help="print JSON, not tables")
     return parser
+
+
+def _kind(text: str) -> str:
+    if text not in scaling.KINDS:
+        raise argparse.ArgumentTypeError(f"{text!r} is none of {', '.join(scaling.KINDS)}")
+    return text
 
 
 def _count(text: str) -> int:

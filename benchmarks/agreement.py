@@ -26,8 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import mitsuba, povray, povray_text
-from benchmarks.machine import Machine, Spread, cores, spread, take_turns, this_machine
-from benchmarks.scaling import warm_sample
+from benchmarks.machine import Machine, Spread, cores, spread, take_turns, this_machine, warm_sample
 from benchmarks.strips import save_strip
 from symrender_cg import Scene, render_image, render_layers
 from symrender_cg.errors import OutsidePlanError

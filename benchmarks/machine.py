@@ -1,17 +1,22 @@
-"""The line that belongs to every figure: processor, cores, compiler, versions. Never here: a path, a host, a date."""
+"""What belongs to every figure: the machine's line, samples, medians, turns. Never here: a path, a host, a date."""
 
 from __future__ import annotations
 
 import os
 import platform
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import sympy as sp
 
 from symrender_cg.build import find_toolchain
 from symrender_cg.errors import ToolchainError
+
+SHORTEST_SAMPLE: Final = 0.01
+"""Seconds that a sample takes at least: what is faster is called several times, and the fastest call counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +90,29 @@ def spread(samples: Sequence[float]) -> Spread:
     """Median and quartiles, interpolated."""
     low, median, high = (float(value) for value in np.quantile(np.asarray(samples), (0.25, 0.5, 0.75)))
     return Spread(median, low, high)
+
+
+def milliseconds(call: Callable[[], object]) -> float:
+    """Wall time of one call."""
+    start = time.perf_counter()
+    call()
+    return 1e3 * (time.perf_counter() - start)
+
+
+def warm_sample(draw: Callable[[], object], shortest: float = SHORTEST_SAMPLE) -> Callable[[], float]:
+    """A call that draws for that many seconds and returns the milliseconds of the fastest image.
+
+    The fastest is one that no other process interrupted. Before the samples, and before the timed images of each, one
+    is drawn that is not timed: what ran before has taken the caches, and the allocator's pages.
+    """
+    draw()
+    calls = max(1, round(shortest / max(1e-3 * milliseconds(draw), 1e-6)))
+
+    def sample() -> float:
+        draw()
+        return min(milliseconds(draw) for _ in range(calls))
+
+    return sample
 
 
 def take_turns(

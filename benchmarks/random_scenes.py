@@ -35,7 +35,7 @@ from rich.table import Table
 from benchmarks.machine import Machine, cores, this_machine
 from symrender_cg.build import Cache
 from symrender_cg.derive.parts import Part
-from symrender_cg.emit.scene import emit_scene, scene_parts
+from symrender_cg.emit.scene import emit_scene, marks_doubt, scene_parts
 from symrender_cg.emit.scene_fields import Needs
 from symrender_cg.errors import OutsidePlanError
 from symrender_cg.lower.parts import lower_part
@@ -80,7 +80,7 @@ class EveryEffect:
     def compiled(accuracy: str, root: Path) -> EveryEffect:
         """Derived, lowered, emitted and compiled; from the cache at `root` where it is there."""
         chosen = variant(accuracy)
-        programs = {name: lower_part(part, chosen) for name, part in _parts().items()}
+        programs = {name: lower_part(part, chosen) for name, part in _parts(accuracy).items()}
         emitted = emit_scene(
             programs,
             need=EVERY_EFFECT,
@@ -140,8 +140,8 @@ def numbers_for_every_effect(found: Plan, fields: Sequence[tuple[str, str]]) -> 
 
 
 @cache
-def _parts() -> dict[str, Part]:
-    return scene_parts(EVERY_EFFECT)
+def _parts(accuracy: str) -> dict[str, Part]:
+    return scene_parts(EVERY_EFFECT, marks=marks_doubt(variant(accuracy)))
 
 
 def _in_channels_of(found: Plan, values: NDArray[Any]) -> NDArray[Any]:

@@ -6,7 +6,6 @@ round; a ratio is the median of the ratios within a round. Errors are those of t
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -16,14 +15,14 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.contestants import BASE, Contestant, contestants
-from benchmarks.machine import Machine, Spread, cores, spread, take_turns, this_machine
+from benchmarks.machine import Machine, Spread, cores, spread, take_turns, this_machine, warm_sample
 from symrender_cg import Scene
 from symrender_cg.reference import oracle
 from symrender_cg.reference.compare import Errors, measure
 from symrender_cg.reference.points import near_silhouette, whole_image
 
 SHORTEST_SAMPLE = 0.015
-"""Seconds: a faster contestant is called several times for one sample."""
+"""Seconds of a sample: a faster contestant is called several times, and its fastest call counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,21 +157,6 @@ def _pixels(scene: Scene, size: int, points: int, seed: int) -> tuple[Any, Any]:
 
 
 def _sample(render: Callable[[], object], size: int) -> Callable[[], float]:
-    """A call that times enough renders for one sample and returns nanoseconds a pixel.
-
-    Each sample begins with a render that is not timed: what ran before has taken the caches, and the allocator's pages.
-    """
-    render()
-    start = time.perf_counter()
-    render()
-    once = max(time.perf_counter() - start, 1e-7)
-    calls = max(1, round(SHORTEST_SAMPLE / once))
-
-    def sample() -> float:
-        render()
-        start = time.perf_counter()
-        for _ in range(calls):
-            render()
-        return (time.perf_counter() - start) / (calls * size**2) * 1e9
-
-    return sample
+    """A call that draws enough images for one sample and returns nanoseconds a pixel of the fastest."""
+    sample = warm_sample(render, SHORTEST_SAMPLE)
+    return lambda: sample() * 1e6 / size**2

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from symrender_cg.version import VERSION as __version__
 
 if TYPE_CHECKING:
+    from symrender_cg.cost.choose import Choice, choose
     from symrender_cg.errors import (
         AccuracyError,
         ArgumentError,
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from symrender_cg.pipeline import compile_kernel, statistics, translate
+    from symrender_cg.run.batch import render_batch
+    from symrender_cg.run.blocks import render_blocks
     from symrender_cg.run.certify import Certificate, Certified
     from symrender_cg.run.render import certify, evaluate, render_image, render_layers
     from symrender_cg.scene import (
@@ -55,8 +58,12 @@ _HOME = {
     "translate": "pipeline",
     "Certificate": "run.certify",
     "Certified": "run.certify",
+    "Choice": "cost.choose",
+    "choose": "cost.choose",
     "certify": "run.render",
     "evaluate": "run.render",
+    "render_batch": "run.batch",
+    "render_blocks": "run.blocks",
     "render_image": "run.render",
     "render_layers": "run.render",
     "AccuracyError": "errors",
@@ -76,6 +83,7 @@ __all__ = [
     "Camera",
     "Certificate",
     "Certified",
+    "Choice",
     "CompileError",
     "CompilerNotFoundError",
     "DirectionalLight",
@@ -92,9 +100,12 @@ __all__ = [
     "ToolchainError",
     "__version__",
     "certify",
+    "choose",
     "compile_kernel",
     "evaluate",
     "load_scene",
+    "render_batch",
+    "render_blocks",
     "render_image",
     "render_layers",
     "statistics",

@@ -26,11 +26,12 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cache as once
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrender_cg.build.cache import Cache, default_root
 from symrender_cg.build.library import CachedKernel
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from symrender_cg.lower.program import KernelProgram
 
 log = logging.getLogger("symrender_cg")
+Floats = NDArray[np.float64]
 
 
 @dataclass
@@ -125,7 +127,7 @@ _guard = threading.Lock()
 
 def compile_kernel(
     scene: Scene,
-    accuracy: str = "double",
+    accuracy: str | Variant = "double",
     *,
     bake: bool = False,
     portable: bool = False,
@@ -139,7 +141,7 @@ def compile_kernel(
 
 def draw(
     scene: Scene,
-    accuracy: str = "double",
+    accuracy: str | Variant = "double",
     *,
     size: tuple[int, int] | None = None,
     clip: bool = False,
@@ -155,16 +157,25 @@ def draw(
     """
     if variant(accuracy).settles:
         raise ArgumentError(
-            f"accuracy: {accuracy!r} is proved value by value, in stages; expected a level that one kernel draws "
-            "alone: 'fast', 'single', 'literal' or 'double'"
+            f"accuracy: {variant(accuracy).name!r} is proved value by value, in stages; expected a level that one "
+            "kernel draws alone: 'fast', 'single', 'literal' or 'double'"
         )
     aspect = None if size is None else size[0] / size[1]
     found = planned(scene, force=tuple(force), aspect=aspect, max_error=max_error)
     kernel = _compiled(found, variant(accuracy), bake=bake, portable=portable, cache=cache)
     white = 1.0 if clip else math.inf
+    decide = partial(_decided, scene, portable, cache) if found.arrangement is not None else None
     if size is None:
-        return bind(kernel, found, white=white)
-    return bind(kernel, found, width=size[0], height=size[1], pixel=pixel_size(found.scene, size[1]), white=white)
+        return bind(kernel, found, white=white, decide=decide)
+    pixel = pixel_size(found.scene, size[1])
+    return bind(kernel, found, width=size[0], height=size[1], pixel=pixel, white=white, decide=decide)
+
+
+def _decided(scene: Scene, portable: bool, cache: str | Path | None, x: Floats, y: Floats) -> tuple[Any, Any]:
+    """Values within 4 ulp at points where rounding decided a kernel of a scene, and which of them are known."""
+    from symrender_cg.run.certify import Job, settle_if_known
+
+    return settle_if_known(Job(scene, variant("stable"), False, portable, cache, 1), x, y)
 
 
 def pixel_size(frame: Scene, height: int) -> float:
@@ -177,13 +188,20 @@ def pixel_size(frame: Scene, height: int) -> float:
 def planned(scene: Scene, *, force: tuple[str, ...] = (), aspect: float | None = None, max_error: float = 0.0) -> Plan:
     """The plan of a scene, remembered: a scene is drawn more than once."""
     found = _planned(scene, force, aspect, max_error)
+    note(found)
+    return found
+
+
+def note(found: Plan) -> None:
+    """Counts and logs it where the plan that is drawn by is of another structure than the one before."""
+    if _last[0] is found:
+        return
     with _guard:
         before, _last[0] = _last[0], found
     if before is not None and before.key != found.key:
         statistics.add("replanned")
         gone, new = sorted(set(before.key) - set(found.key)), sorted(set(found.key) - set(before.key))
         log.debug("replanned: %s after %s; in: %s; out: %s", found.name, before.name, new or "-", gone or "-")
-    return found
 
 
 _last: list[Plan | None] = [None]
@@ -197,7 +215,7 @@ def _planned(scene: Scene, force: tuple[str, ...], aspect: float | None, max_err
 
 def translate(
     scene: Scene,
-    accuracy: str = "double",
+    accuracy: str | Variant = "double",
     *,
     target: str | None = None,
     bake: bool = False,
@@ -288,13 +306,13 @@ def _translated_sphere(
 def _translated_scene(
     found: Plan, chosen: Variant, seconds: dict[str, float], *, name: str | None, command: str
 ) -> SceneTranslation:
-    from symrender_cg.emit.scene import emit_scene, scene_parts
+    from symrender_cg.emit.scene import emit_scene, marks_doubt, scene_parts
     from symrender_cg.emit.scene_fields import Needs
     from symrender_cg.lower.parts import lower_part
 
     start = time.perf_counter()
     need = Needs.of(found.flags)
-    parts = scene_parts(need)
+    parts = scene_parts(need, marks=marks_doubt(chosen))
     derived = time.perf_counter()
     programs = {key: lower_part(part, chosen) for key, part in parts.items()}
     lowered = time.perf_counter()
@@ -409,7 +427,8 @@ def build_kernel(
     """The compiled library of a translation, from the cache where it is there; remembered under `recipe`, if given."""
     store = Cache(root if root is not None else default_root())
     emitted = translation.emitted
-    cached = store.kernel(emitted.files, emitted.cdef, portable=portable)
+    flags = translation.variant.flags
+    cached = store.kernel(emitted.files, emitted.cdef, portable=portable, extra_flags=flags)
     if not cached.from_cache:
         statistics.add("compiled")
     if recipe is not None:
@@ -436,7 +455,7 @@ def _compiled(
     require_format(found, chosen.shading)
     root = Path(cache) if cache is not None else default_root()
     baked = tuple(sorted(numbers_of(found.scene).items())) if bake else ()
-    key = (found.key, chosen.name, baked, portable, root)
+    key = (found.key, chosen.key, baked, portable, root)
     kernel = _kernels.get(key)
     if kernel is not None:
         statistics.add("reused")
@@ -451,9 +470,9 @@ def _compiled(
 def _kernel(
     found: Plan, chosen: Variant, baked: tuple[tuple[str, float], ...], *, portable: bool, root: Path
 ) -> Kernel | SceneKernel:
-    recipe = recipe_of(found, chosen.name, baked, portable)
+    recipe = recipe_of(found, chosen.key, baked, portable)
     store = Cache(root)
-    recalled = store.recall(recipe, portable=portable)
+    recalled = store.recall(recipe, portable=portable, extra_flags=chosen.flags)
     if recalled is not None:
         cached, payload = recalled
         statistics.add("recalled")

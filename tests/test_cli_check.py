@@ -319,10 +319,11 @@ def _spoiled_scene(monkeypatch: pytest.MonkeyPatch, spoil: Any) -> None:
     """Lets every double kernel of a scene give other values at points than it computes."""
     honest = SceneKernel.points
 
-    def points_of(self: SceneKernel, values: Any, x: Any, y: Any, prepared: Any) -> None:
-        honest(self, values, x, y, prepared)
+    def points_of(self: SceneKernel, values: Any, x: Any, y: Any, prepared: Any) -> Any:
+        doubtful = honest(self, values, x, y, prepared)
         if self.dtype == np.float64:
             spoil(values)
+        return doubtful
 
     monkeypatch.setattr(SceneKernel, "points", points_of)
 

@@ -10,6 +10,7 @@ from command_line import Shell
 
 from symrender_cg import Scene, render_image
 from symrender_cg.build.cache import Cache
+from symrender_cg.build.reports import function_at
 from symrender_cg.cli import doctor
 from symrender_cg.plan.plan import plan
 
@@ -64,8 +65,8 @@ def test_a_line_is_put_into_the_function_that_it_stands_in() -> None:
         "{",
         "    for",
     ]
-    assert doctor._function_at(lines, 3) == "f"
-    assert doctor._function_at(lines, 9) == "g_rows"
+    assert function_at(lines, 3) == "f"
+    assert function_at(lines, 9) == "g_rows"
 
 
 def test_without_a_compiler_the_exit_code_is_5_and_the_remedies_are_listed(

@@ -241,8 +241,10 @@ def loops(text: str) -> list[Loop]:
 
 
 def inner_loops(text: str) -> list[Loop]:
-    """The loops without a loop inside, save those that settle the few doubtful points by exact arithmetic."""
-    return [loop for loop in loops(text) if "for (" not in loop.body and "hits_exactly(" not in loop.body]
+    """The loops without a loop inside, save those that settle the few doubtful points by exact arithmetic, and the one
+    over the images of a batch."""
+    outer = ("for (", "hits_exactly(", "_rows(")
+    return [loop for loop in loops(text) if not any(word in loop.body for word in outer)]
 
 
 @pytest.mark.parametrize("kernel", [k for k in KERNELS if not re.search("^scene|_stable$|_certified", k)])
@@ -258,10 +260,13 @@ def test_every_inner_loop_becomes_vector_code(compiler: str, kernel: str, monkey
     file = f"{kernel}.c"
     inner = inner_loops(sources[file])
 
-    shading = [loop for loop in inner if "shade(" in loop.body]
-    fills = [loop for loop in inner if loop not in shading]
-    assert len(shading) == 2, "the pixels of a row, and points"
-    assert len(fills) == (2 if "pixel_span" in sources[file] else 0), (
+    stages = len(set(re.findall(r"^SYMRENDER_INLINE void (stage_\d+)", sources[file], flags=re.MULTILINE)))
+    shading = [loop for loop in inner if re.search(r"shade\(|stage_\d", loop.body)]
+    values = [loop for loop in inner if "at_most(" in loop.body and loop not in shading]
+    fills = [loop for loop in inner if loop not in shading + values]
+    assert len(shading) == 2 * max(1, stages), "each stage, for the pixels of a row and for points"
+    assert bool(values) == bool(stages), "values are written in loops of their own where the steps of a pixel are"
+    assert len(fills) == (2 if stages or "pixel_span" in sources[file] else 0), (
         "background to the left and to the right of a span"
     )
 

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from symrender_cg.errors import AccuracyError, SymrenderError
 from symrender_cg.stress.cases import Case, Family, Inputs
 from symrender_cg.stress.corpus import corpus
-from symrender_cg.stress.families import FAMILIES, KEPT_FAMILIES, family
+from symrender_cg.stress.families import FAMILIES, KEPT_FAMILIES
 from symrender_cg.stress.kept import Kept, read_kept
 from symrender_cg.stress.measure import evaluate_at, levels, outcome_of, outcomes_at, truth_of
 from symrender_cg.stress.promises import broken, promise_of
@@ -77,7 +77,7 @@ def test_every_kept_case_has_at_every_level_what_that_level_states(level: str) -
             continue
         scene, point = inputs_of(case).scene(), point_of(case)
         outcome = outcomes_at(scene, [point], level, kept_truth(case))[0]
-        assert broken(level, scene, outcome, jumps=False) is None, case["id"]
+        assert broken(level, scene, outcome) is None, case["id"]
         if outcome.refused is None:
             answered += 1
         else:
@@ -148,7 +148,7 @@ def test_no_case_of_any_family_breaks_what_a_level_states(data: st.DataObject) -
         assert outcome.refused is not None
     else:
         assert case.scene is not None
-        assert broken(level, case.scene, outcome, jumps=entry.jumps) is None
+        assert broken(level, case.scene, outcome) is None
 
 
 def test_a_corpus_has_none_of_the_kept_points() -> None:
@@ -167,7 +167,7 @@ def test_kept_worst_points_have_what_every_level_states(point: Kept) -> None:
     answered = 0
     for level in levels_of(point.family):
         outcome = outcomes_at(point.scene, [(point.x, point.y)], level, true)[0]
-        assert broken(level, point.scene, outcome, jumps=family(point.family).jumps) is None, level
+        assert broken(level, point.scene, outcome) is None, level
         answered += outcome.refused is None
     assert answered >= 2
 

@@ -24,7 +24,7 @@ from symrender_cg.build import find_toolchain, project_flags
 from symrender_cg.build.vectorisation import report
 from symrender_cg.derive.parts import Part
 from symrender_cg.emit.c99 import Emitted
-from symrender_cg.emit.scene import emit_scene, scene_parts
+from symrender_cg.emit.scene import emit_scene, marks_doubt, scene_parts
 from symrender_cg.emit.scene_fields import Needs
 from symrender_cg.lower.parts import lower_part
 from symrender_cg.lower.program import KernelProgram
@@ -93,7 +93,8 @@ def lowered(part: Part, accuracy: str) -> KernelProgram:
 
 @cache
 def emitted(need: Needs, accuracy: str) -> Emitted:
-    programs = {name: lowered(part, accuracy) for name, part in scene_parts(need).items()}
+    marks = marks_doubt(variant(accuracy))
+    programs = {name: lowered(part, accuracy) for name, part in scene_parts(need, marks=marks).items()}
     found = planned(Scene.chapter1(), force=(SCENE,))
     return emit_scene(
         programs, need=need, plan=found, variant=variant(accuracy), command="none", name=f"scene_{accuracy}"
@@ -282,16 +283,18 @@ static int draw(const char *what, const {name}_scene *scene, double pixel)
         term[k] = calloc(SIDE * SIDE * CHANNELS * (k < 3 ? 1 : LIGHTS), sizeof **term);
     {name}_layers layers = {{depth, normal, index, term[0], term[1], term[2], term[3], term[4]}};
     {name}_frame *frame = {name}_prepare(scene, &grid);
-    int status = {name}_rows(image, SIDE * CHANNELS, frame, &layers, 0, SIDE / 2);
-    status |= {name}_rows(image, SIDE * CHANNELS, frame, NULL, SIDE / 2, SIDE);
+    ptrdiff_t unsettled[SIDE * SIDE];
+    int failed = {name}_rows(image, SIDE * CHANNELS, frame, &layers, 0, SIDE / 2, unsettled) < 0;
+    failed |= {name}_rows(image, SIDE * CHANNELS, frame, NULL, SIDE / 2, SIDE, NULL) != 0;
     double x[SIDE * SIDE], y[SIDE * SIDE];
     for (int j = 0; j < SIDE; ++j)
         for (int i = 0; i < SIDE; ++i) {{
             x[SIDE * j + i] = (i + 0.5 - 0.5 * SIDE) * pixel;
             y[SIDE * j + i] = (0.5 * SIDE - 0.5 - j) * pixel;
         }}
-    status |= {name}_points(values, x, y, SIDE * SIDE, frame);
-    status |= {name}_points(values, x, y, 0, frame) | {name}_rows(image, SIDE * CHANNELS, frame, NULL, 3, 3);
+    failed |= {name}_points(values, x, y, SIDE * SIDE, frame, unsettled) < 0;
+    failed |= {name}_points(values, x, y, 0, frame, NULL) != 0;
+    failed |= {name}_rows(image, SIDE * CHANNELS, frame, NULL, 3, 3, NULL) != 0;
     {name}_release(frame);
     {name}_release(NULL);
     for (int i = 0; i < SIDE * SIDE * CHANNELS; ++i)
@@ -299,7 +302,7 @@ static int draw(const char *what, const {name}_scene *scene, double pixel)
     free(image), free(values), free(depth), free(normal), free(index);
     for (int k = 0; k < 5; ++k)
         free(term[k]);
-    return status;
+    return failed;
 }}
 """
 

@@ -320,26 +320,25 @@ FINE = Outcome(ulp=0.4, error=1e-16, size=0.5)
 def test_a_promise_is_broken_by_what_it_states_and_by_nothing_else(
     level: str, outcome: Outcome, why: str | None
 ) -> None:
-    found = broken(level, CHAPTER1, outcome, jumps=False)
+    found = broken(level, CHAPTER1, outcome)
     assert (found is None) == (why is None)
     if why is not None:
         assert found is not None
         assert why in found
 
 
-def test_the_absolute_bound_is_not_stated_near_the_light_of_narrow_highlights_mirrors_and_jumps() -> None:
+def test_the_absolute_bound_is_not_stated_near_the_light_and_of_narrow_highlights() -> None:
     assert has_absolute_bound(CHAPTER1)
-    mirror = structs.replace(CHAPTER1.spheres[0], material=Phong(reflect=0.5))
     for scene in (
         Scene.chapter1(light=(0.0, 0.0, 1.0009765)),
         Scene.chapter1(light=(0.0, 0.999023, 0.0)),
         Scene.chapter1(shininess=1001.0),
-        structs.replace(CHAPTER1, spheres=(mirror,)),
     ):
         assert not has_absolute_bound(scene)
-        assert broken("double", scene, replace(FINE, error=1e-3), jumps=False) is None
+        assert broken("double", scene, replace(FINE, error=1e-3)) is None
     assert has_absolute_bound(Scene.chapter1(light=(0.0, 0.0, 1.002), shininess=1000.0))
-    assert broken("double", CHAPTER1, replace(FINE, error=1e-3), jumps=True) is None
+    mirror = structs.replace(CHAPTER1.spheres[0], material=Phong(reflect=0.5))
+    assert has_absolute_bound(structs.replace(CHAPTER1, spheres=(mirror,)))
     assert set(levels()) <= {*PROMISES, *(level for level in levels() if ":" in level)}
     assert promise_of("certified:uint8") is PROMISES["certified"]
 
@@ -422,7 +421,7 @@ def test_a_scene_s_own_points_are_measured_as_one_set_each() -> None:
     frame = Scene.builtin("two_spheres").in_camera_frame()
     sets = hard_points(frame, 20, SEED)
     assert {"image", "outlines", "highlights"} <= {entry.name for entry in sets}
-    report = run_scene(((e.name, e.jumps, frame, e.points) for e in sets), ("double",), seed=SEED)
+    report = run_scene(((e.name, frame, e.points) for e in sets), ("double",), seed=SEED)
     assert [row.family for row in report.rows] == [entry.name for entry in sets]
     assert all(row.cases == len(entry.points) for row, entry in zip(report.rows, sets, strict=True))
     assert report.holds

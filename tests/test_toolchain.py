@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -11,10 +13,20 @@ from pathlib import Path
 
 import pytest
 
-from symrender_cg.build import Cache, compile_library, find_toolchain, kernel_flags, project_flags, vectorisation
+from symrender_cg.build import (
+    Cache,
+    compile_library,
+    find_toolchain,
+    kernel_flags,
+    project_flags,
+    reports,
+    vectorisation,
+)
 from symrender_cg.build import toolchain as toolchain_module
 from symrender_cg.build.diagnosis import diagnose
 from symrender_cg.build.toolchain import REMEDIES, RecordStore, Toolchain
+from symrender_cg.cli import vectors
+from symrender_cg.cli.main import main
 from symrender_cg.errors import ArgumentError, CompileError, CompilerNotFoundError
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -365,3 +377,109 @@ def test_the_cache_remembers_its_toolchain_between_instances(monkeypatch: pytest
     first = Cache(tmp_path).toolchain()
     monkeypatch.setattr(subprocess, "Popen", no_process)
     assert Cache(tmp_path).toolchain() == first
+
+
+def test_a_compiler_knows_the_levels_of_x86_64_where_it_makes_code_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = find_toolchain()
+    if not found.portable.triple.startswith("x86_64"):
+        assert not found.knows_levels
+        return
+    command = [*found.command, "-march=x86-64-v3", "-E", "-x", "c", os.devnull]
+    assert found.knows_levels == (subprocess.run(command, capture_output=True, check=False).returncode == 0)
+    monkeypatch.setenv("CC", f"{GCC} -march=x86-64-v2")
+    assert not find_toolchain().knows_levels
+
+
+def test_the_levels_are_those_that_the_versions_of_the_compilers_know() -> None:
+    for kind, macros, expected in (
+        ("gcc", {"__x86_64__": "1", "__GNUC__": "11"}, True),
+        ("gcc", {"__x86_64__": "1", "__GNUC__": "10"}, False),
+        ("gcc", {"__aarch64__": "1", "__GNUC__": "12"}, False),
+        ("clang", {"__x86_64__": "1", "__GNUC__": "4", "__clang_major__": "14"}, True),
+        ("clang", {"__x86_64__": "1", "__GNUC__": "4", "__clang_major__": "11"}, False),
+        ("clang", {"__x86_64__": "1", "__clang_major__": "12", "__apple_build_version__": "1"}, False),
+        ("zig", {"__x86_64__": "1", "__clang_major__": "18"}, True),
+    ):
+        assert toolchain_module._knows_levels(kind, macros) is expected, (kind, macros)
+
+
+NESTED = """\
+static double total(
+    const double *x, int n)
+{
+    double sum = 0.0;
+    /* all of them */
+    for (int i = 0; i < n; ++i)
+        sum += x[i];
+    while (sum > 1.0
+           && n > 0) {
+        const double half = 0.5;
+        sum *= half;
+        sum = sum - half;
+    }
+    return sum;
+}
+
+void each(double *x, int n)
+{
+    for (int j = 0; j < n; ++j) {
+        for (int i = 0; i < n; ++i) {
+            /* light [4 mul] */
+            x[i] = x[j];
+        }
+    }
+}
+"""
+
+
+def test_loops_are_found_with_their_function_lines_and_purpose() -> None:
+    found = [(o.function, o.line, o.last, o.does, o.holds_loops) for o in reports.loops_of(NESTED)]
+    assert found == [
+        ("total", 6, 7, "all of them", False),
+        ("total", 8, 13, "sum = sum - half;", False),
+        ("each", 19, 24, "x[i] = x[j];", True),
+        ("each", 20, 23, "light", False),
+    ]
+
+
+@pytest.mark.parametrize("goal", reports.goals(), ids=lambda goal: f"{goal.kind}-{goal.processor}")
+def test_each_goal_has_a_verdict_on_every_loop(goal: reports.Goal) -> None:
+    given = reports.verdicts(LOOPS, "loops.c", goal)
+    assert {line: verdict.bytes for line, verdict in given.items()} == {8: goal.bytes, 13: goal.bytes, 18: 0}
+    assert given[8].reasons == given[13].reasons == ()
+    assert given[18].reasons
+    assert given[18].reasons != (reports.SILENCE,)
+
+
+def test_a_goal_whose_flags_are_refused_is_said_and_the_others_are_shown(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    goal = next((goal for goal in reports.goals() if not goal.is_foreign), None)
+    assert goal is not None
+    refused = reports.Goal(goal.kind, "aarch64", (*goal.command, "-march=no-such-processor"), 16)
+    monkeypatch.setattr(vectors, "goals", lambda: (goal, refused))
+    (tmp_path / "loops.c").write_text(LOOPS["loops.c"])
+    monkeypatch.setenv("SYMRENDER_CACHE_DIR", str(tmp_path))
+    assert main(["doctor", "--vectors", str(tmp_path / "loops.c")]) == 0
+    shown = capsys.readouterr().out
+    assert re.search(rf"^ +8  roots +y\[i\] = shade\(x\[i\]\); +{goal.bytes}$", shown, re.MULTILINE)
+    assert re.search(r"^ +18  decay .* -$", shown, re.MULTILINE)
+    assert re.search(rf"^line 18, {goal.kind}: \S", shown, re.MULTILINE)
+    assert re.search(r"^runs here: \S+", shown, re.MULTILINE)
+    assert re.search(rf"^not compiled: {goal.kind} for aarch64: .*no-such-processor", shown, re.MULTILINE)
+    assert main(["doctor", "--vectors", str(tmp_path / "loops.c"), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert [loop["verdicts"][0]["bytes"] for loop in data["loops"]] == [goal.bytes, goal.bytes, 0]
+    assert data["not_compiled"][0]["processor"] == "aarch64"
+
+
+def test_a_kernel_that_is_not_there_is_an_error_of_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--vectors", "nowhere/kernel.c"]) == 2
+    assert "there is no file nowhere/kernel.c" in capsys.readouterr().err
+
+
+def test_the_vectors_of_a_level_are_those_of_its_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vectors, "goals", lambda: ())
+    kernel, sources = vectors._sources("single")
+    assert kernel == "centred_sphere_single"
+    assert {loop.function for loop in vectors.survey(kernel, sources).loops} >= {f"{kernel}_rows", f"{kernel}_points"}

@@ -3,9 +3,8 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy double
  *
- * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
- *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
- *          wrong
+ * promise  at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and n <= 1000; another
+ *          kernel draws what this one may not; no overflow; hit or miss never wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone
@@ -14,31 +13,39 @@
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      once: frame 4 mul 3 div 1 select 20 call
+ * ops      once: frame 4 mul 3 div 1 select 21 call
  *          a row: 1 mul 5 call
- *          a pixel: 38 mul 27 add 2 div 2 sqrt 2 max 2 select 1 call
+ *          a pixel: 38 mul 27 add 2 div 2 sqrt 2 max 2 select 2 call
+ *          of these, once for two of them, at x and -x: 24 mul 17 add 1 div 1 sqrt 1 max
  */
 #include "centred_sphere_double.h"
 
 #include "inline.h"
 #include "span.h"
 #include "units.h"
-#include "phong_power.h"
+#include "block.h"
+#include "lobe_power.h"
 #include "double_double.h"
 #include "exact_sign.h"
 #include <math.h>
 
-enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful ones among them are settled */
+enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first level cache */
 
 /* What does not change within a frame. */
 typedef struct {
-    double plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, along_frame, diffuse_gain, zero_power,
-        specular_gain, k_ambient, shininess;
+    int half_exponent;
+    double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, along_frame,
+        diffuse_gain, k_ambient, shininess;
     double_double alpha, rho2, depth;
 } frame;
 
 static frame frame_of(const centred_sphere_double_scene *scene)
 {
+    /* specular [1 mul 1 select 1 call] */
+    const int half_exponent = half_of_whole(scene->shininess);   /* n / 2 where n is an even whole number, else 0 */
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+    const double specular_gain = scene->k_specular * scene->light_intensity;   /* I_L k_s */
+
     /* units of length, powers of two [5 call] */
     const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
     const double plane_unit = ldexp(1, plane_exponent);
@@ -77,11 +84,10 @@ static frame frame_of(const centred_sphere_double_scene *scene)
     /* diffuse [1 mul] */
     const double diffuse_gain = scene->k_diffuse * scene->light_intensity;   /* I_L k_d */
 
-    /* specular [1 mul 1 select] */
-    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
-    const double specular_gain = scene->k_specular * scene->light_intensity;   /* I_L k_s */
-
     const frame f = {
+        .half_exponent = half_exponent,
+        .zero_power = zero_power,
+        .specular_gain = specular_gain,
         .plane_unit = plane_unit,
         .lamp_x = lamp_x,
         .lamp_y = lamp_y,
@@ -93,8 +99,6 @@ static frame frame_of(const centred_sphere_double_scene *scene)
         .d_dot_d_frame = d_dot_d_frame,
         .along_frame = along_frame,
         .diffuse_gain = diffuse_gain,
-        .zero_power = zero_power,
-        .specular_gain = specular_gain,
         .k_ambient = scene->k_ambient,
         .shininess = scene->shininess,
     };
@@ -144,12 +148,9 @@ static inline double certainty(double facing2, double d_dot_d)
     return fabs(facing2) - 0x1p-40 * d_dot_d;
 }
 
-/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
-static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
-    const centred_sphere_double_scene *scene)
+/* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
+SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *sure)
 {
-    const double x = column * step;
-
     /* ray and sphere [3 mul 6 add] */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
@@ -160,12 +161,31 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
 
-    return certainty(facing2, d_dot_d) > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+    *sure = certainty(facing2, d_dot_d);
+    return facing2;
 }
 
-/* Intensity of the sphere along the ray through x of this row, and in *sure how surely the ray hits or misses:
- * the sign of *sight says which. */
-SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double *sight, double *sure)
+/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
+static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
+    const centred_sphere_double_scene *scene)
+{
+    double sure;
+    const double facing2 = sight(column * step, r, f, &sure);
+
+    return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+}
+
+/* Values of a block of pixels, from the stages that compute them to those that use them. */
+typedef struct {
+    double x[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS], n_dot_l_even[POINTS],
+        mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS], w_dot_mirror_even[POINTS], side_y_odd[POINTS],
+        side_z_odd[POINTS], sin2_even[POINTS], w2[POINTS], diffuse[POINTS], w_dot_mirror[POINTS], cos2[POINTS],
+        sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
+} block;
+
+/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 6 add 1 div 1 sqrt 1 max]. Leaves x, s, facing,
+ * inv_d2. */
+SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
     /* distance to the two ends of the span, not negative inside it */
@@ -178,49 +198,140 @@ SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double *si
     const double d_dot_d = s + f->d_dot_d_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
-    /* normal [6 mul 2 add 1 div] */
+    /* normal [1 div] */
     const double inv_d2 = 1.0 / d_dot_d;
-    const double along = inv_d2 * (f->along_frame - facing);   /* t / R: n = (t x, t y, e (1 - t)) / R */
-    const double n_x = x * along;
-    const double n_y = r->y * along;
-    const double n_z = (s * f->depth.hi + f->focal * facing) * inv_d2;   /* a sum, where e (1 - t) would cancel */
 
-    /* light [7 mul 7 add 1 div 1 sqrt] */
-    const double w_x = f->lamp_x - n_x;   /* w = (L - P) / R */
+    b->x[i] = x;
+    b->s[i] = s;
+    b->facing[i] = facing;
+    b->inv_d2[i] = inv_d2;
+}
+
+/* Stage 2, the same for x and -x: normal, light, specular [21 mul 11 add]. Leaves n_x, w2_even, n_dot_l_even,
+ * mirror_x, mirror_y, mirror_z, w_dot_mirror_even, side_y_odd, side_z_odd, sin2_even. */
+SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
+{
+    /* normal [6 mul 2 add] */
+    const double along = b->inv_d2[i] * (f->along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    const double n_x = b->x[i] * along;
+    const double n_y = r->y * along;
+    /* a sum, where e (1 - t) would cancel */
+    const double n_z = (b->s[i] * f->depth.hi + f->focal * b->facing[i]) * b->inv_d2[i];
+
+    /* light [4 mul 4 add] */
     const double w_y = f->lamp_y - n_y;
     const double w_z = f->lamp_z - n_z;
-    const double w2 = w_x * w_x + w_y * w_y + w_z * w_z;   /* |w|^2 */
+    const double w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
+    const double n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
+
+    /* specular [11 mul 5 add] */
+    const double bounce = 2.0 * b->facing[i];
+    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
+    const double mirror_x = b->x[i] + n_x * bounce;
+    const double mirror_y = r->y + n_y * bounce;
+    const double mirror_z = n_z * bounce - f->focal;
+    const double w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
+    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
+    const double side_y_odd = w_z * mirror_x;   /* what x and -x share up to the sign in side_y */
+    const double side_z_odd = -(w_y * mirror_x);   /* what x and -x share up to the sign in side_z */
+    const double sin2_even = side_x * side_x;   /* what x and -x share in sin2 */
+
+    b->n_x[i] = n_x;
+    b->w2_even[i] = w2_even;
+    b->n_dot_l_even[i] = n_dot_l_even;
+    b->mirror_x[i] = mirror_x;
+    b->mirror_y[i] = mirror_y;
+    b->mirror_z[i] = mirror_z;
+    b->w_dot_mirror_even[i] = w_dot_mirror_even;
+    b->side_y_odd[i] = side_y_odd;
+    b->side_z_odd[i] = side_z_odd;
+    b->sin2_even[i] = sin2_even;
+}
+
+/* Stage 3: light, diffuse, specular [13 mul 8 add 1 div 1 sqrt 1 max]. Leaves w2, diffuse, w_dot_mirror, cos2, sin2. */
+SYMRENDER_INLINE void stage_3(double side, const frame *f, block *b, int i)
+{
+    const double n_x = side * b->n_x[i];
+    const double mirror_x = side * b->mirror_x[i];
+    const double side_y_odd = side * b->side_y_odd[i];
+    const double side_z_odd = side * b->side_z_odd[i];
+
+    /* light [3 mul 3 add 1 div 1 sqrt] */
+    const double w_x = f->lamp_x - n_x;   /* w = (L - P) / R */
+    const double w2 = w_x * w_x + b->w2_even[i];   /* |w|^2 */
     const double inv_w2 = 1.0 / w2;
-    const double n_dot_l = (n_x * w_x + n_y * w_y + n_z * w_z) * sqrt(inv_w2);   /* n.l = n.w / |w| */
+    const double n_dot_l = sqrt(inv_w2) * (n_x * w_x + b->n_dot_l_even[i]);   /* n.l = n.w / |w| */
 
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
     const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [21 mul 10 add 1 select 1 call]. Phong 1975, Illumination for computer generated pictures */
-    const double bounce = 2.0 * facing;
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double mirror_x = x + n_x * bounce;
-    const double mirror_y = r->y + n_y * bounce;
-    const double mirror_z = n_z * bounce - f->focal;
-    const double w_dot_mirror = w_x * mirror_x + w_y * mirror_y + w_z * mirror_z;   /* r.v = w . mirror / (|w| |D|) */
-    const double inv_w2_d2 = inv_d2 * inv_w2;
+    /* specular [9 mul 5 add] */
+    const double w_dot_mirror = w_x * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|) */
+    const double inv_w2_d2 = b->inv_d2[i] * inv_w2;
     const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
-    const double side_y = w_z * mirror_x - w_x * mirror_z;
-    const double side_z = w_x * mirror_y - w_y * mirror_x;
+    const double side_y = side_y_odd - w_x * b->mirror_z[i];
+    const double side_z = w_x * b->mirror_y[i] + side_z_odd;
     /* 1 - (r.v)^2, accurate where r.v is near 1 */
-    const double sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
-    const double highlight = power_of_cosine(cos2, sin2, f->shininess);   /* max(0, r.v)^n where r.v > 0 */
+    const double sin2 = inv_w2_d2 * (side_y * side_y + side_z * side_z + b->sin2_even[i]);
+
+    b->w2[i] = w2;
+    b->diffuse[i] = diffuse;
+    b->w_dot_mirror[i] = w_dot_mirror;
+    b->cos2[i] = cos2;
+    b->sin2[i] = sin2;
+}
+
+/* Stage 4: specular [1 call]. Leaves highlight_log2. */
+SYMRENDER_INLINE void stage_4(block *b, int i)
+{
+    /* specular [1 call] */
+    const double highlight_log2 = log2_of_lobe(b->cos2[i], b->sin2[i]);   /* log2 (r.v)^2 */
+
+    b->highlight_log2[i] = highlight_log2;
+}
+
+/* Stage 5: specular [1 call]. Leaves highlight. */
+SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
+{
+    /* specular [1 call]. Phong 1975, Illumination for computer generated pictures */
+    const double highlight = power_of_lobe(b->highlight_log2[i], f->shininess);   /* max(0, r.v)^n where r.v > 0 */
+
+    b->highlight[i] = highlight;
+}
+
+/* Stage 6: specular, intensity [1 mul 2 add 2 select]. Leaves value. */
+SYMRENDER_INLINE void stage_6(const frame *f, block *b, int i)
+{
+    const double highlight = b->highlight[i];
+    const double zero_power = f->zero_power;
+
+    /* specular [1 mul 1 select]. Phong 1975, Illumination for computer generated pictures */
     /* k_s max(0, r.v)^n */
-    const double specular = (w_dot_mirror > 0.0 ? highlight : f->zero_power) * f->specular_gain;
+    const double specular = (b->w_dot_mirror[i] > 0.0 ? highlight : zero_power) * f->specular_gain;
 
     /* intensity [2 add 1 select]. Phong 1975, Illumination for computer generated pictures */
-    const double lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
-    const double value = f->k_ambient + (w2 > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
+    const double lit = b->diffuse[i] + specular;   /* what the light adds; the gains hold its intensity */
+    const double value = f->k_ambient + (b->w2[i] > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
 
-    *sight = facing2;
-    *sure = certainty(facing2, d_dot_d);
-    return value;
+    b->value[i] = value;
+}
+
+/* The stages that differ between x and -x, for pixels right (side 1) or left (side -1) of the middle of the row. */
+SYMRENDER_INLINE void finish(double side, int count, const row *r, const frame *f, block *b)
+{
+    for (int i = 0; i < count; ++i)
+        stage_3(side, f, b, i);
+    if (f->half_exponent > 0) {
+        whole_powers_of_lobe(b->sin2, b->highlight_log2, b->highlight, f->half_exponent, count);
+    } else {
+        for (int i = 0; i < count; ++i)
+            stage_4(b, i);
+        for (int i = 0; i < count; ++i)
+            stage_5(f, b, i);
+    }
+    for (int i = 0; i < count; ++i)
+        stage_6(f, b, i);
+    (void)r;
 }
 
 static inline double at_most(double intensity, double white)
@@ -238,31 +349,43 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
     const double white = grid->white;
     const double background = at_most(scene->background, white);
     const int width = grid->width;
+    block b SYMRENDER_ALIGNED;
+    row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
         double *restrict out = image + j * stride;
         const double plane_y = (top - j) * pixel;
-        const row r = row_of(plane_y * unit, &f);
+        const row r = next;
+        next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
 
-        /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
-        const double left_end = r.x_left.hi / step - left, right_end = r.x_right.hi / step - left;
-        pixel_span hits = span_between(left_end, right_end, width);
-        while (hits.first > 0 && is_hit(hits.first - 1 + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.first;
-        while (hits.last < width - 1 && is_hit(hits.last + 1 + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.last;
-        while (hits.first <= hits.last && !is_hit(hits.first + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.first;
-        while (hits.last >= hits.first && !is_hit(hits.last + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.last;
+        /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
+         * closed form and settled by an exact test */
+        int last = span_between(0.0, r.x_right.hi / step - left, width).last;
+        while (last < width - 1 && is_hit(last + 1 + left, plane_y, &r, &f, pixel, step, scene))
+            ++last;
+        while (last >= width / 2 && !is_hit(last + left, plane_y, &r, &f, pixel, step, scene))
+            --last;
 
-        const int begin = hits.first <= hits.last ? hits.first : width;
-        const int end = hits.first <= hits.last ? hits.last + 1 : width;
+        const int end = last >= width / 2 ? last + 1 : width;
+        const int begin = last >= width / 2 ? width - end : width;
+        if (j + 1 < row_end)
+            fetch_ahead(out + stride, (size_t)width * sizeof *out);
         for (int i = 0; i < begin; ++i)
             out[i] = background;
-        for (int i = begin; i < end; ++i) {
-            double sight, sure;
-            out[i] = at_most(shade((i + left) * step, &r, &f, &sight, &sure), white);
+        /* the right half of the span, and pixel by pixel its mirror image */
+        for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
+            count = end - at < POINTS ? end - at : POINTS;
+            const int vectors = whole_vectors(count);
+            for (int i = 0; i < vectors; ++i)
+                stage_1((at + i + left) * step, &r, &f, &b, i);
+            for (int i = 0; i < vectors; ++i)
+                stage_2(&r, &f, &b, i);
+            finish(1.0, vectors, &r, &f, &b);
+            for (int i = 0; i < count; ++i)
+                out[at + i] = at_most(b.value[i], white);
+            finish(-1.0, vectors, &r, &f, &b);
+            for (int i = 0; i < count; ++i)
+                out[width - 1 - at - i] = at_most(b.value[i], white);
         }
         for (int i = end; i < width; ++i)
             out[i] = background;
@@ -275,25 +398,53 @@ void centred_sphere_double_points(double *values, const double *x, const double 
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;
     const double background = at_most(scene->background, white);
+    block b SYMRENDER_ALIGNED;
 
-    for (ptrdiff_t block = 0; block < count; block += POINTS) {
-        const int length = count - block < POINTS ? (int)(count - block) : POINTS;
-        const double *restrict block_x = x + block, *restrict block_y = y + block;
-        double *restrict out = values + block;
-        double doubt[POINTS];
+    for (ptrdiff_t at = 0; at < count; at += POINTS) {
+        const int length = count - at < POINTS ? (int)(count - at) : POINTS;
+        const double *restrict block_x = x + at, *restrict block_y = y + at;
+        double *restrict out = values + at;
+        double facing[POINTS], doubt[POINTS];
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);
-            double sight, sure;
-            const double intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
-            out[i] = at_most(sight > 0.0 ? intensity : background, white);
-            doubt[i] = sure;
+            facing[i] = sight(block_x[i] * unit, &r, &f, &doubt[i]);
+            stage_1(block_x[i] * unit, &r, &f, &b, i);
+        }
+        for (int i = 0; i < length; ++i) {
+            const row r = row_of(block_y[i] * unit, &f);
+            stage_2(&r, &f, &b, i);
         }
         for (int i = 0; i < length; ++i)
-            if (!(doubt[i] > 0.0)) {
-                const row r = row_of(block_y[i] * unit, &f);
-                double sight, sure;
-                const double intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
-                out[i] = at_most(hits_exactly(block_x[i], block_y[i], scene) ? intensity : background, white);
-            }
+            stage_3(1.0, &f, &b, i);
+        if (f.half_exponent > 0) {
+            whole_powers_of_lobe(b.sin2, b.highlight_log2, b.highlight, f.half_exponent, length);
+        } else {
+            for (int i = 0; i < length; ++i)
+                stage_4(&b, i);
+            for (int i = 0; i < length; ++i)
+                stage_5(&f, &b, i);
+        }
+        for (int i = 0; i < length; ++i)
+            stage_6(&f, &b, i);
+        for (int i = 0; i < length; ++i)
+            out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background, white);
+        for (int i = 0; i < length; ++i)
+            if (!(doubt[i] > 0.0))
+                out[i] = at_most(hits_exactly(block_x[i], block_y[i], scene) ? b.value[i] : background, white);
+    }
+}
+
+void centred_sphere_double_batch(double *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const centred_sphere_double_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end)
+{
+    const int height = grids->height;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : height;
+        centred_sphere_double_rows(
+            images + k * image_stride, stride, &grids[k], &scenes[k], begin, end);
     }
 }

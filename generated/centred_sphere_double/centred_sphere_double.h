@@ -37,6 +37,12 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
 void centred_sphere_double_points(double *values, const double *x, const double *y,
     ptrdiff_t count, double white, const centred_sphere_double_scene *scene);
 
+/* Writes rows [row_begin, row_end) of many images of one size, counted through: row j of image k is row k * height + j
+ * and starts at images + k * image_stride + j * stride. Each image has its own scene and grid. */
+void centred_sphere_double_batch(double *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const centred_sphere_double_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end);
+
 #ifdef __cplusplus
 }
 #endif

@@ -3,9 +3,8 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy double --bake
  *
- * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
- *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
- *          wrong
+ * promise  at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and n <= 1000; another
+ *          kernel draws what this one may not; no overflow; hit or miss never wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone
@@ -18,17 +17,19 @@
  * ops      at build time: frame 3 call
  *          a row: 1 mul 5 call
  *          a pixel: 37 mul 28 add 2 div 2 sqrt 2 max 3 select 4 call
+ *          of these, once for two of them, at x and -x: 23 mul 17 add 1 div 1 sqrt 1 max
  */
 #include "centred_sphere_double_baked.h"
 
 #include "inline.h"
 #include "span.h"
 #include "square.h"
+#include "block.h"
 #include "double_double.h"
 #include "exact_sign.h"
 #include <math.h>
 
-enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful ones among them are settled */
+enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first level cache */
 
 /* What does not change within a frame, computed to 200 bits and rounded once. */
 static const double background = 0.0;   /* where no ray hits */
@@ -87,11 +88,9 @@ static inline double certainty(double facing2, double d_dot_d)
     return fabs(facing2) - 0x1p-40 * d_dot_d;
 }
 
-/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
-static int is_hit(double column, double plane_y, const row *r, double pixel, double step)
+/* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
+SYMRENDER_INLINE double sight(double x, const row *r, double *sure)
 {
-    const double x = column * step;
-
     /* ray and sphere [3 mul 6 add] */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
@@ -102,12 +101,29 @@ static int is_hit(double column, double plane_y, const row *r, double pixel, dou
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + 1.0;
 
-    return certainty(facing2, d_dot_d) > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y);
+    *sure = certainty(facing2, d_dot_d);
+    return facing2;
 }
 
-/* Intensity of the sphere along the ray through x of this row, and in *sure how surely the ray hits or misses:
- * the sign of *sight says which. */
-SYMRENDER_INLINE double shade(double x, const row *r, double *sight, double *sure)
+/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
+static int is_hit(double column, double plane_y, const row *r, double pixel, double step)
+{
+    double sure;
+    const double facing2 = sight(column * step, r, &sure);
+
+    return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y);
+}
+
+/* Values of a block of pixels, from the stages that compute them to those that use them. */
+typedef struct {
+    double x[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS], n_dot_l_even[POINTS],
+        mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS], w_dot_mirror_even[POINTS], side_y_odd[POINTS],
+        side_z_odd[POINTS], sin2_even[POINTS], value[POINTS];
+} block;
+
+/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 6 add 1 div 1 sqrt 1 max]. Leaves x, s, facing,
+ * inv_d2. */
+SYMRENDER_INLINE void stage_1(double x, const row *r, block *b, int i)
 {
     /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
     /* distance to the two ends of the span, not negative inside it */
@@ -120,38 +136,80 @@ SYMRENDER_INLINE double shade(double x, const row *r, double *sight, double *sur
     const double d_dot_d = s + 1.0;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
-    /* normal [5 mul 2 add 1 div] */
+    /* normal [1 div] */
     const double inv_d2 = 1.0 / d_dot_d;
-    const double along = inv_d2 * (along_frame - facing);   /* t / R: n = (t x, t y, e (1 - t)) / R */
-    const double n_x = x * along;
-    const double n_y = r->y * along;
-    const double n_z = (s * depth.hi + facing) * inv_d2;   /* a sum, where e (1 - t) would cancel */
 
-    /* light [7 mul 7 add 1 div 1 sqrt] */
-    const double w_x = lamp_x - n_x;   /* w = (L - P) / R */
+    b->x[i] = x;
+    b->s[i] = s;
+    b->facing[i] = facing;
+    b->inv_d2[i] = inv_d2;
+}
+
+/* Stage 2, the same for x and -x: normal, light, specular [20 mul 11 add]. Leaves n_x, w2_even, n_dot_l_even,
+ * mirror_x, mirror_y, mirror_z, w_dot_mirror_even, side_y_odd, side_z_odd, sin2_even. */
+SYMRENDER_INLINE void stage_2(const row *r, block *b, int i)
+{
+    /* normal [5 mul 2 add] */
+    const double along = b->inv_d2[i] * (along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    const double n_x = b->x[i] * along;
+    const double n_y = r->y * along;
+    const double n_z = (b->s[i] * depth.hi + b->facing[i]) * b->inv_d2[i];   /* a sum, where e (1 - t) would cancel */
+
+    /* light [4 mul 4 add] */
     const double w_y = lamp_y - n_y;
     const double w_z = lamp_z - n_z;
-    const double w2 = w_x * w_x + w_y * w_y + w_z * w_z;   /* |w|^2 */
+    const double w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
+    const double n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
+
+    /* specular [11 mul 5 add] */
+    const double bounce = 2.0 * b->facing[i];
+    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
+    const double mirror_x = b->x[i] + n_x * bounce;
+    const double mirror_y = r->y + n_y * bounce;
+    const double mirror_z = n_z * bounce - 1.0;
+    const double w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
+    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
+    const double side_y_odd = w_z * mirror_x;   /* what x and -x share up to the sign in side_y */
+    const double side_z_odd = -(w_y * mirror_x);   /* what x and -x share up to the sign in side_z */
+    const double sin2_even = side_x * side_x;   /* what x and -x share in sin2 */
+
+    b->n_x[i] = n_x;
+    b->w2_even[i] = w2_even;
+    b->n_dot_l_even[i] = n_dot_l_even;
+    b->mirror_x[i] = mirror_x;
+    b->mirror_y[i] = mirror_y;
+    b->mirror_z[i] = mirror_z;
+    b->w_dot_mirror_even[i] = w_dot_mirror_even;
+    b->side_y_odd[i] = side_y_odd;
+    b->side_z_odd[i] = side_z_odd;
+    b->sin2_even[i] = sin2_even;
+}
+
+/* Stage 3: light, diffuse, specular, intensity [14 mul 11 add 1 div 1 sqrt 1 max 3 select 4 call]. Leaves value. */
+SYMRENDER_INLINE void stage_3(double side, block *b, int i)
+{
+    const double n_x = side * b->n_x[i];
+    const double mirror_x = side * b->mirror_x[i];
+    const double side_y_odd = side * b->side_y_odd[i];
+    const double side_z_odd = side * b->side_z_odd[i];
+
+    /* light [3 mul 3 add 1 div 1 sqrt] */
+    const double w_x = lamp_x - n_x;   /* w = (L - P) / R */
+    const double w2 = w_x * w_x + b->w2_even[i];   /* |w|^2 */
     const double inv_w2 = 1.0 / w2;
-    const double n_dot_l = (n_x * w_x + n_y * w_y + n_z * w_z) * sqrt(inv_w2);   /* n.l = n.w / |w| */
+    const double n_dot_l = sqrt(inv_w2) * (n_x * w_x + b->n_dot_l_even[i]);   /* n.l = n.w / |w| */
 
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
     const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [21 mul 11 add 2 select 4 call]. Phong 1975, Illumination for computer generated pictures */
-    const double bounce = 2.0 * facing;
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double mirror_x = x + n_x * bounce;
-    const double mirror_y = r->y + n_y * bounce;
-    const double mirror_z = n_z * bounce - 1.0;
-    const double w_dot_mirror = w_x * mirror_x + w_y * mirror_y + w_z * mirror_z;   /* r.v = w . mirror / (|w| |D|) */
-    const double inv_w2_d2 = inv_d2 * inv_w2;
+    /* specular [10 mul 6 add 2 select 4 call]. Phong 1975, Illumination for computer generated pictures */
+    const double w_dot_mirror = w_x * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|) */
+    const double inv_w2_d2 = b->inv_d2[i] * inv_w2;
     const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
-    const double side_y = w_z * mirror_x - w_x * mirror_z;
-    const double side_z = w_x * mirror_y - w_y * mirror_x;
+    const double side_y = side_y_odd - w_x * b->mirror_z[i];
+    const double side_z = w_x * b->mirror_y[i] + side_z_odd;
     /* 1 - (r.v)^2, accurate where r.v is near 1 */
-    const double sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
+    const double sin2 = inv_w2_d2 * (side_y * side_y + side_z * side_z + b->sin2_even[i]);
     const double lobe = 0.5 > sin2 ? 1.0 - sin2 : cos2;   /* (r.v)^2, accurate where r.v is near 1 */
     const double lobe_2 = square(lobe);   /* lobe^2 */
     const double lobe_4 = square(lobe_2);   /* lobe^4 */
@@ -164,9 +222,15 @@ SYMRENDER_INLINE double shade(double x, const row *r, double *sight, double *sur
     const double lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
     const double value = 0.1 + (w2 > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
 
-    *sight = facing2;
-    *sure = certainty(facing2, d_dot_d);
-    return value;
+    b->value[i] = value;
+}
+
+/* The stages that differ between x and -x, for pixels right (side 1) or left (side -1) of the middle of the row. */
+SYMRENDER_INLINE void finish(double side, int count, const row *r, block *b)
+{
+    for (int i = 0; i < count; ++i)
+        stage_3(side, b, i);
+    (void)r;
 }
 
 static inline double at_most(double intensity, double white)
@@ -183,31 +247,43 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
     const double white = grid->white;
     const double background_here = at_most(background, white);
     const int width = grid->width;
+    block b SYMRENDER_ALIGNED;
+    row next = row_of((top - row_begin) * pixel * unit);
 
     for (int j = row_begin; j < row_end; ++j) {
         double *restrict out = image + j * stride;
         const double plane_y = (top - j) * pixel;
-        const row r = row_of(plane_y * unit);
+        const row r = next;
+        next = row_of((top - (j + 1)) * pixel * unit);   /* begun here, it is ready when this row is done */
 
-        /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
-        const double left_end = r.x_left.hi / step - left, right_end = r.x_right.hi / step - left;
-        pixel_span hits = span_between(left_end, right_end, width);
-        while (hits.first > 0 && is_hit(hits.first - 1 + left, plane_y, &r, pixel, step))
-            --hits.first;
-        while (hits.last < width - 1 && is_hit(hits.last + 1 + left, plane_y, &r, pixel, step))
-            ++hits.last;
-        while (hits.first <= hits.last && !is_hit(hits.first + left, plane_y, &r, pixel, step))
-            ++hits.first;
-        while (hits.last >= hits.first && !is_hit(hits.last + left, plane_y, &r, pixel, step))
-            --hits.last;
+        /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
+         * closed form and settled by an exact test */
+        int last = span_between(0.0, r.x_right.hi / step - left, width).last;
+        while (last < width - 1 && is_hit(last + 1 + left, plane_y, &r, pixel, step))
+            ++last;
+        while (last >= width / 2 && !is_hit(last + left, plane_y, &r, pixel, step))
+            --last;
 
-        const int begin = hits.first <= hits.last ? hits.first : width;
-        const int end = hits.first <= hits.last ? hits.last + 1 : width;
+        const int end = last >= width / 2 ? last + 1 : width;
+        const int begin = last >= width / 2 ? width - end : width;
+        if (j + 1 < row_end)
+            fetch_ahead(out + stride, (size_t)width * sizeof *out);
         for (int i = 0; i < begin; ++i)
             out[i] = background_here;
-        for (int i = begin; i < end; ++i) {
-            double sight, sure;
-            out[i] = at_most(shade((i + left) * step, &r, &sight, &sure), white);
+        /* the right half of the span, and pixel by pixel its mirror image */
+        for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
+            count = end - at < POINTS ? end - at : POINTS;
+            const int vectors = whole_vectors(count);
+            for (int i = 0; i < vectors; ++i)
+                stage_1((at + i + left) * step, &r, &b, i);
+            for (int i = 0; i < vectors; ++i)
+                stage_2(&r, &b, i);
+            finish(1.0, vectors, &r, &b);
+            for (int i = 0; i < count; ++i)
+                out[at + i] = at_most(b.value[i], white);
+            finish(-1.0, vectors, &r, &b);
+            for (int i = 0; i < count; ++i)
+                out[width - 1 - at - i] = at_most(b.value[i], white);
         }
         for (int i = end; i < width; ++i)
             out[i] = background_here;
@@ -219,25 +295,28 @@ void centred_sphere_double_baked_points(double *values, const double *x, const d
 {
     const double unit = plane_unit;
     const double background_here = at_most(background, white);
+    block b SYMRENDER_ALIGNED;
 
-    for (ptrdiff_t block = 0; block < count; block += POINTS) {
-        const int length = count - block < POINTS ? (int)(count - block) : POINTS;
-        const double *restrict block_x = x + block, *restrict block_y = y + block;
-        double *restrict out = values + block;
-        double doubt[POINTS];
+    for (ptrdiff_t at = 0; at < count; at += POINTS) {
+        const int length = count - at < POINTS ? (int)(count - at) : POINTS;
+        const double *restrict block_x = x + at, *restrict block_y = y + at;
+        double *restrict out = values + at;
+        double facing[POINTS], doubt[POINTS];
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit);
-            double sight, sure;
-            const double intensity = shade(block_x[i] * unit, &r, &sight, &sure);
-            out[i] = at_most(sight > 0.0 ? intensity : background_here, white);
-            doubt[i] = sure;
+            facing[i] = sight(block_x[i] * unit, &r, &doubt[i]);
+            stage_1(block_x[i] * unit, &r, &b, i);
+        }
+        for (int i = 0; i < length; ++i) {
+            const row r = row_of(block_y[i] * unit);
+            stage_2(&r, &b, i);
         }
         for (int i = 0; i < length; ++i)
-            if (!(doubt[i] > 0.0)) {
-                const row r = row_of(block_y[i] * unit);
-                double sight, sure;
-                const double intensity = shade(block_x[i] * unit, &r, &sight, &sure);
-                out[i] = at_most(hits_exactly(block_x[i], block_y[i]) ? intensity : background_here, white);
-            }
+            stage_3(1.0, &b, i);
+        for (int i = 0; i < length; ++i)
+            out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background_here, white);
+        for (int i = 0; i < length; ++i)
+            if (!(doubt[i] > 0.0))
+                out[i] = at_most(hits_exactly(block_x[i], block_y[i]) ? b.value[i] : background_here, white);
     }
 }

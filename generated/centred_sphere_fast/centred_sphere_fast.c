@@ -14,19 +14,21 @@
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
  * ops      once: frame 4 mul 3 div 1 select 20 call
  *          a row: 1 mul 5 call
- *          a pixel: 28 mul 23 add 2 div 2 sqrt 2 max 2 select 1 call
+ *          a pixel: 28 mul 22 add 2 div 2 sqrt 2 max 2 select 2 call
+ *          of these, once for two of them, at x and -x: 19 mul 16 add 1 div 1 sqrt 1 max
  */
 #include "centred_sphere_fast.h"
 
 #include "inline.h"
 #include "span.h"
 #include "units.h"
+#include "block.h"
 #include "fast_power.h"
 #include "double_double.h"
 #include "exact_sign.h"
 #include <math.h>
 
-enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful ones among them are settled */
+enum { POINTS = 256 };   /* pixels of a block: its arrays fit into the first level cache */
 
 /* What does not change within a frame. */
 typedef struct {
@@ -157,12 +159,9 @@ static inline double certainty(double facing2, double d_dot_d)
     return fabs(facing2) - 0x1p-40 * d_dot_d;
 }
 
-/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
-static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
-    const centred_sphere_fast_scene *scene)
+/* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
+SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *sure)
 {
-    const double x = column * step;
-
     /* ray and sphere [3 mul 6 add] */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
@@ -174,12 +173,30 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const float d_dot_d = s + f->d_dot_d_frame;
 
-    return certainty(facing2, d_dot_d) > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+    *sure = certainty(facing2, d_dot_d);
+    return facing2;
 }
 
-/* Intensity of the sphere along the ray through x of this row, and in *sure how surely the ray hits or misses:
- * the sign of *sight says which. */
-SYMRENDER_INLINE float shade(double x, const row *r, const frame *f, double *sight, double *sure)
+/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
+static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
+    const centred_sphere_fast_scene *scene)
+{
+    double sure;
+    const double facing2 = sight(column * step, r, f, &sure);
+
+    return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+}
+
+/* Values of a block of pixels, from the stages that compute them to those that use them. */
+typedef struct {
+    float x_single[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS],
+        n_dot_l_even[POINTS], mirror_x[POINTS], w_dot_mirror_even[POINTS], w2[POINTS], diffuse[POINTS],
+        w_dot_mirror[POINTS], highlight_log2[POINTS], value[POINTS];
+} block;
+
+/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 6 add 1 div 1 sqrt 1 max]. Leaves x_single, s,
+ * facing, inv_d2. */
+SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
     /* distance to the two ends of the span, not negative inside it */
@@ -195,46 +212,101 @@ SYMRENDER_INLINE float shade(double x, const row *r, const frame *f, double *sig
     /* -n.D, how far the surface faces the ray: root / R */
     const float facing = sqrtf(facing2_single > 0.0f ? facing2_single : 0.0f);
 
-    /* normal [6 mul 2 add 1 div] */
+    /* normal [1 div] */
     const float inv_d2 = 1.0f / d_dot_d;
-    const float along = inv_d2 * (f->along_frame - facing);   /* t / R: n = (t x, t y, e (1 - t)) / R */
-    const float n_x = x_single * along;
+
+    b->x_single[i] = x_single;
+    b->s[i] = s;
+    b->facing[i] = facing;
+    b->inv_d2[i] = inv_d2;
+}
+
+/* Stage 2, the same for x and -x: normal, light, specular [16 mul 10 add]. Leaves n_x, w2_even, n_dot_l_even,
+ * mirror_x, w_dot_mirror_even. */
+SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
+{
+    /* normal [6 mul 2 add] */
+    const float along = b->inv_d2[i] * (f->along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    const float n_x = b->x_single[i] * along;
     const float n_y = r->y_single * along;
     /* a sum, where e (1 - t) would cancel */
-    const float n_z = (s * f->depth_single + f->focal_single * facing) * inv_d2;
+    const float n_z = (b->s[i] * f->depth_single + f->focal_single * b->facing[i]) * b->inv_d2[i];
 
-    /* light [7 mul 7 add 1 div 1 sqrt] */
-    const float w_x = f->lamp_x_single - n_x;   /* w = (L - P) / R */
+    /* light [4 mul 4 add] */
     const float w_y = f->lamp_y_single - n_y;
     const float w_z = f->lamp_z_single - n_z;
-    const float w2 = w_x * w_x + w_y * w_y + w_z * w_z;   /* |w|^2 */
+    const float w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
+    const float n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
+
+    /* specular [6 mul 4 add] */
+    const float bounce = 2.0f * b->facing[i];
+    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
+    const float mirror_x = b->x_single[i] + n_x * bounce;
+    const float mirror_y = r->y_single + n_y * bounce;
+    const float mirror_z = n_z * bounce - f->focal_single;
+    const float w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
+
+    b->n_x[i] = n_x;
+    b->w2_even[i] = w2_even;
+    b->n_dot_l_even[i] = n_dot_l_even;
+    b->mirror_x[i] = mirror_x;
+    b->w_dot_mirror_even[i] = w_dot_mirror_even;
+}
+
+/* Stage 3: light, diffuse, specular [8 mul 4 add 1 div 1 sqrt 1 max 1 call]. Leaves w2, diffuse, w_dot_mirror,
+ * highlight_log2. */
+SYMRENDER_INLINE void stage_3(float side, const frame *f, block *b, int i)
+{
+    const float n_x = side * b->n_x[i];
+    const float mirror_x = side * b->mirror_x[i];
+
+    /* light [3 mul 3 add 1 div 1 sqrt] */
+    const float w_x = f->lamp_x_single - n_x;   /* w = (L - P) / R */
+    const float w2 = w_x * w_x + b->w2_even[i];   /* |w|^2 */
     const float inv_w2 = 1.0f / w2;
-    const float n_dot_l = (n_x * w_x + n_y * w_y + n_z * w_z) * sqrtf(inv_w2);   /* n.l = n.w / |w| */
+    const float n_dot_l = sqrtf(inv_w2) * (n_x * w_x + b->n_dot_l_even[i]);   /* n.l = n.w / |w| */
 
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
     const float diffuse = (n_dot_l > 0.0f ? n_dot_l : 0.0f) * f->diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [11 mul 6 add 1 select 1 call]. Phong 1975, Illumination for computer generated pictures */
-    const float bounce = 2.0f * facing;
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const float mirror_x = x_single + n_x * bounce;
-    const float mirror_y = r->y_single + n_y * bounce;
-    const float mirror_z = n_z * bounce - f->focal_single;
-    const float w_dot_mirror = w_x * mirror_x + w_y * mirror_y + w_z * mirror_z;   /* r.v = w . mirror / (|w| |D|) */
-    const float inv_w2_d2 = inv_d2 * inv_w2;
+    /* specular [4 mul 1 add 1 call] */
+    const float w_dot_mirror = w_x * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|) */
+    const float inv_w2_d2 = b->inv_d2[i] * inv_w2;
     const float cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const float sin2 = 1.0f - cos2;   /* 1 - (r.v)^2 as a difference: what cancels is paid for */
-    const float highlight = fast_power_of_cosinef(cos2, sin2, f->shininess_single);   /* max(0, r.v)^n where r.v > 0 */
+    const float highlight_log2 = fast_log2_of_squaref(cos2);   /* log2 (r.v)^2 */
+
+    b->w2[i] = w2;
+    b->diffuse[i] = diffuse;
+    b->w_dot_mirror[i] = w_dot_mirror;
+    b->highlight_log2[i] = highlight_log2;
+}
+
+/* Stage 4: specular, intensity [1 mul 2 add 2 select 1 call]. Leaves value. */
+SYMRENDER_INLINE void stage_4(const frame *f, block *b, int i)
+{
+    const float zero_power_single = f->zero_power_single;
+
+    /* specular [1 mul 1 select 1 call]. Phong 1975, Illumination for computer generated pictures */
+    /* max(0, r.v)^n where r.v > 0 */
+    const float highlight = fast_power_of_lobef(b->highlight_log2[i], f->shininess_single);
     /* k_s max(0, r.v)^n */
-    const float specular = (w_dot_mirror > 0.0f ? highlight : f->zero_power_single) * f->specular_gain;
+    const float specular = (b->w_dot_mirror[i] > 0.0f ? highlight : zero_power_single) * f->specular_gain;
 
     /* intensity [2 add 1 select]. Phong 1975, Illumination for computer generated pictures */
-    const float lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
-    const float value = f->k_ambient_single + (w2 > 0.0f ? lit : 0.0f);   /* I = k_a + what the light adds */
+    const float lit = b->diffuse[i] + specular;   /* what the light adds; the gains hold its intensity */
+    const float value = f->k_ambient_single + (b->w2[i] > 0.0f ? lit : 0.0f);   /* I = k_a + what the light adds */
 
-    *sight = facing2;
-    *sure = certainty(facing2, d_dot_d);
-    return value;
+    b->value[i] = value;
+}
+
+/* The stages that differ between x and -x, for pixels right (side 1) or left (side -1) of the middle of the row. */
+SYMRENDER_INLINE void finish(float side, int count, const row *r, const frame *f, block *b)
+{
+    for (int i = 0; i < count; ++i)
+        stage_3(side, f, b, i);
+    for (int i = 0; i < count; ++i)
+        stage_4(f, b, i);
+    (void)r;
 }
 
 static inline float at_most(float intensity, float white)
@@ -252,31 +324,43 @@ void centred_sphere_fast_rows(float *image, ptrdiff_t stride, const symrender_gr
     const float white = (float)grid->white;
     const float background = at_most((float)scene->background, white);
     const int width = grid->width;
+    block b SYMRENDER_ALIGNED;
+    row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
         float *restrict out = image + j * stride;
         const double plane_y = (top - j) * pixel;
-        const row r = row_of(plane_y * unit, &f);
+        const row r = next;
+        next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
 
-        /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
-        const double left_end = r.x_left.hi / step - left, right_end = r.x_right.hi / step - left;
-        pixel_span hits = span_between(left_end, right_end, width);
-        while (hits.first > 0 && is_hit(hits.first - 1 + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.first;
-        while (hits.last < width - 1 && is_hit(hits.last + 1 + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.last;
-        while (hits.first <= hits.last && !is_hit(hits.first + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.first;
-        while (hits.last >= hits.first && !is_hit(hits.last + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.last;
+        /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
+         * closed form and settled by an exact test */
+        int last = span_between(0.0, r.x_right.hi / step - left, width).last;
+        while (last < width - 1 && is_hit(last + 1 + left, plane_y, &r, &f, pixel, step, scene))
+            ++last;
+        while (last >= width / 2 && !is_hit(last + left, plane_y, &r, &f, pixel, step, scene))
+            --last;
 
-        const int begin = hits.first <= hits.last ? hits.first : width;
-        const int end = hits.first <= hits.last ? hits.last + 1 : width;
+        const int end = last >= width / 2 ? last + 1 : width;
+        const int begin = last >= width / 2 ? width - end : width;
+        if (j + 1 < row_end)
+            fetch_ahead(out + stride, (size_t)width * sizeof *out);
         for (int i = 0; i < begin; ++i)
             out[i] = background;
-        for (int i = begin; i < end; ++i) {
-            double sight, sure;
-            out[i] = at_most(shade((i + left) * step, &r, &f, &sight, &sure), white);
+        /* the right half of the span, and pixel by pixel its mirror image */
+        for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
+            count = end - at < POINTS ? end - at : POINTS;
+            const int vectors = whole_vectors(count);
+            for (int i = 0; i < vectors; ++i)
+                stage_1((at + i + left) * step, &r, &f, &b, i);
+            for (int i = 0; i < vectors; ++i)
+                stage_2(&r, &f, &b, i);
+            finish(1.0f, vectors, &r, &f, &b);
+            for (int i = 0; i < count; ++i)
+                out[at + i] = at_most(b.value[i], white);
+            finish(-1.0f, vectors, &r, &f, &b);
+            for (int i = 0; i < count; ++i)
+                out[width - 1 - at - i] = at_most(b.value[i], white);
         }
         for (int i = end; i < width; ++i)
             out[i] = background;
@@ -290,25 +374,45 @@ void centred_sphere_fast_points(float *values, const double *x, const double *y,
     const double unit = f.plane_unit;
     const float white = (float)white_limit;
     const float background = at_most((float)scene->background, white);
+    block b SYMRENDER_ALIGNED;
 
-    for (ptrdiff_t block = 0; block < count; block += POINTS) {
-        const int length = count - block < POINTS ? (int)(count - block) : POINTS;
-        const double *restrict block_x = x + block, *restrict block_y = y + block;
-        float *restrict out = values + block;
-        double doubt[POINTS];
+    for (ptrdiff_t at = 0; at < count; at += POINTS) {
+        const int length = count - at < POINTS ? (int)(count - at) : POINTS;
+        const double *restrict block_x = x + at, *restrict block_y = y + at;
+        float *restrict out = values + at;
+        double facing[POINTS], doubt[POINTS];
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);
-            double sight, sure;
-            const float intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
-            out[i] = at_most(sight > 0.0 ? intensity : background, white);
-            doubt[i] = sure;
+            facing[i] = sight(block_x[i] * unit, &r, &f, &doubt[i]);
+            stage_1(block_x[i] * unit, &r, &f, &b, i);
+        }
+        for (int i = 0; i < length; ++i) {
+            const row r = row_of(block_y[i] * unit, &f);
+            stage_2(&r, &f, &b, i);
         }
         for (int i = 0; i < length; ++i)
-            if (!(doubt[i] > 0.0)) {
-                const row r = row_of(block_y[i] * unit, &f);
-                double sight, sure;
-                const float intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
-                out[i] = at_most(hits_exactly(block_x[i], block_y[i], scene) ? intensity : background, white);
-            }
+            stage_3(1.0f, &f, &b, i);
+        for (int i = 0; i < length; ++i)
+            stage_4(&f, &b, i);
+        for (int i = 0; i < length; ++i)
+            out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background, white);
+        for (int i = 0; i < length; ++i)
+            if (!(doubt[i] > 0.0))
+                out[i] = at_most(hits_exactly(block_x[i], block_y[i], scene) ? b.value[i] : background, white);
+    }
+}
+
+void centred_sphere_fast_batch(float *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const centred_sphere_fast_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end)
+{
+    const int height = grids->height;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : height;
+        centred_sphere_fast_rows(
+            images + k * image_stride, stride, &grids[k], &scenes[k], begin, end);
     }
 }

@@ -164,3 +164,18 @@ void centred_sphere_literal_points(double *values, const double *x, const double
         values[i] = at_most(shade(x[i] * unit, &r, &f, background), white);
     }
 }
+
+void centred_sphere_literal_batch(double *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const centred_sphere_literal_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end)
+{
+    const int height = grids->height;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : height;
+        centred_sphere_literal_rows(
+            images + k * image_stride, stride, &grids[k], &scenes[k], begin, end);
+    }
+}

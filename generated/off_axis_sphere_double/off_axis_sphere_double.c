@@ -3,9 +3,8 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build off_axis --accuracy double
  *
- * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
- *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
- *          wrong
+ * promise  at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and n <= 1000; another
+ *          kernel draws what this one may not; no overflow; hit or miss never wrong
  * in       sphere off the axis
  *          diffuse term
  *          specular term
@@ -15,32 +14,39 @@
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      once: frame 3 mul 3 add 4 div 1 select 40 call
+ * ops      once: frame 3 mul 3 add 4 div 1 select 41 call
  *          a row: 4 mul 2 add 16 call
- *          a pixel: 47 mul 34 add 2 div 2 sqrt 2 max 2 select 1 call
+ *          a pixel: 47 mul 34 add 2 div 2 sqrt 2 max 2 select 2 call
  */
 #include "off_axis_sphere_double.h"
 
 #include "inline.h"
 #include "span.h"
 #include "units.h"
-#include "phong_power.h"
+#include "block.h"
+#include "lobe_power.h"
 #include "double_double.h"
 #include "exact_sign.h"
 #include <math.h>
 
-enum { POINTS = 256 };   /* points shaded in one go, before the few doubtful ones among them are settled */
+enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first level cache */
 
 /* What does not change within a frame. */
 typedef struct {
-    double plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, tilt_frame, diffuse_gain, zero_power,
-        specular_gain, k_ambient, shininess;
+    int half_exponent;
+    double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, tilt_frame,
+        diffuse_gain, k_ambient, shininess;
     double_double offset_y, alpha, depth, offset_x, row_mid_frame, row_gap_frame, row_disc_frame, row_half_frame,
         x_left_frame, image_x, image_y;
 } frame;
 
 static frame frame_of(const off_axis_sphere_double_scene *scene)
 {
+    /* specular [1 mul 1 select 1 call] */
+    const int half_exponent = half_of_whole(scene->shininess);   /* n / 2 where n is an even whole number, else 0 */
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+    const double specular_gain = scene->k_specular * scene->light_intensity;   /* I_L k_s */
+
     /* units of length, powers of two [8 call] */
     const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
     const double plane_unit = ldexp(1, plane_exponent);
@@ -92,11 +98,10 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
     /* diffuse [1 mul] */
     const double diffuse_gain = scene->k_diffuse * scene->light_intensity;   /* I_L k_d */
 
-    /* specular [1 mul 1 select] */
-    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
-    const double specular_gain = scene->k_specular * scene->light_intensity;   /* I_L k_s */
-
     const frame f = {
+        .half_exponent = half_exponent,
+        .zero_power = zero_power,
+        .specular_gain = specular_gain,
         .plane_unit = plane_unit,
         .lamp_x = lamp_x,
         .lamp_y = lamp_y,
@@ -116,8 +121,6 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
         .d_dot_d_frame = d_dot_d_frame,
         .tilt_frame = tilt_frame,
         .diffuse_gain = diffuse_gain,
-        .zero_power = zero_power,
-        .specular_gain = specular_gain,
         .k_ambient = scene->k_ambient,
         .shininess = scene->shininess,
     };
@@ -194,12 +197,9 @@ static inline double certainty(double facing2, double d_dot_d)
     return fabs(facing2) - 0x1p-40 * d_dot_d;
 }
 
-/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
-static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
-    const off_axis_sphere_double_scene *scene)
+/* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
+SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *sure)
 {
-    const double x = column * step;
-
     /* ray and sphere [3 mul 6 add] */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
@@ -210,12 +210,29 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
 
-    return certainty(facing2, d_dot_d) > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+    *sure = certainty(facing2, d_dot_d);
+    return facing2;
 }
 
-/* Intensity of the sphere along the ray through x of this row, and in *sure how surely the ray hits or misses:
- * the sign of *sight says which. */
-SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double *sight, double *sure)
+/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
+static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
+    const off_axis_sphere_double_scene *scene)
+{
+    double sure;
+    const double facing2 = sight(column * step, r, f, &sure);
+
+    return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+}
+
+/* Values of a block of pixels, from the stages that compute them to those that use them. */
+typedef struct {
+    double x[POINTS], facing[POINTS], inv_d2[POINTS], dx[POINTS], tilt[POINTS], n_x[POINTS], n_y[POINTS], n_z[POINTS],
+        w_x[POINTS], w_y[POINTS], w_z[POINTS], w2[POINTS], inv_w2[POINTS], n_dot_l[POINTS], diffuse[POINTS],
+        w_dot_mirror[POINTS], cos2[POINTS], sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
+} block;
+
+/* Stage 1: ray and sphere, normal [10 mul 11 add 1 div 1 sqrt 1 max]. Leaves x, facing, inv_d2, dx, tilt, n_x. */
+SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
     /* distance to the two ends of the span, not negative inside it */
@@ -228,51 +245,126 @@ SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double *si
     const double d_dot_d = s + f->d_dot_d_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
-    /* normal [15 mul 9 add 1 div] */
+    /* normal [7 mul 5 add 1 div] */
     const double inv_d2 = 1.0 / d_dot_d;
     const double dx = x - f->image_x.hi - f->image_x.lo;   /* the pixel seen from the image of the centre */
     const double tilt = f->tilt_frame * (r->tilt_row - dx * f->image_y.hi);
     /* the foot point (D x (D x m)) / |D|^2 lies on the ray, nearest to the centre; n is it less facing D / |D|^2 */
     const double n_x = inv_d2 * (f->depth.hi * (f->focal * dx - r->y * tilt) - x * facing);
-    const double n_y = inv_d2 * (f->depth.hi * (x * tilt + r->n_y_row) - r->y * facing);
-    const double n_z = inv_d2 * (f->focal * facing + f->depth.hi * (x * dx + r->n_z_row));
+
+    b->x[i] = x;
+    b->facing[i] = facing;
+    b->inv_d2[i] = inv_d2;
+    b->dx[i] = dx;
+    b->tilt[i] = tilt;
+    b->n_x[i] = n_x;
+}
+
+/* Stage 2: normal, light [15 mul 11 add 1 div 1 sqrt]. Leaves n_y, n_z, w_x, w_y, w_z, w2, inv_w2, n_dot_l. */
+SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
+{
+    /* normal [8 mul 4 add] */
+    const double n_y = b->inv_d2[i] * (f->depth.hi * (b->x[i] * b->tilt[i] + r->n_y_row) - r->y * b->facing[i]);
+    const double n_z = b->inv_d2[i] * (f->focal * b->facing[i] + f->depth.hi * (b->x[i] * b->dx[i] + r->n_z_row));
 
     /* light [7 mul 7 add 1 div 1 sqrt] */
-    const double w_x = f->lamp_x - n_x;   /* w = (L - P) / R */
+    const double w_x = f->lamp_x - b->n_x[i];   /* w = (L - P) / R */
     const double w_y = f->lamp_y - n_y;
     const double w_z = f->lamp_z - n_z;
     const double w2 = w_x * w_x + w_y * w_y + w_z * w_z;   /* |w|^2 */
     const double inv_w2 = 1.0 / w2;
-    const double n_dot_l = (n_x * w_x + n_y * w_y + n_z * w_z) * sqrt(inv_w2);   /* n.l = n.w / |w| */
+    const double n_dot_l = (b->n_x[i] * w_x + n_y * w_y + n_z * w_z) * sqrt(inv_w2);   /* n.l = n.w / |w| */
 
+    b->n_y[i] = n_y;
+    b->n_z[i] = n_z;
+    b->w_x[i] = w_x;
+    b->w_y[i] = w_y;
+    b->w_z[i] = w_z;
+    b->w2[i] = w2;
+    b->inv_w2[i] = inv_w2;
+    b->n_dot_l[i] = n_dot_l;
+}
+
+/* Stage 3: diffuse, specular [21 mul 10 add 1 max]. Leaves diffuse, w_dot_mirror, cos2, sin2. */
+SYMRENDER_INLINE void stage_3(const row *r, const frame *f, block *b, int i)
+{
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
-    const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
+    const double diffuse = (b->n_dot_l[i] > 0.0 ? b->n_dot_l[i] : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [21 mul 10 add 1 select 1 call]. Phong 1975, Illumination for computer generated pictures */
-    const double bounce = 2.0 * facing;
+    /* specular [20 mul 10 add] */
+    const double bounce = 2.0 * b->facing[i];
     /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double mirror_x = x + n_x * bounce;
-    const double mirror_y = r->y + n_y * bounce;
-    const double mirror_z = n_z * bounce - f->focal;
-    const double w_dot_mirror = w_x * mirror_x + w_y * mirror_y + w_z * mirror_z;   /* r.v = w . mirror / (|w| |D|) */
-    const double inv_w2_d2 = inv_d2 * inv_w2;
+    const double mirror_x = b->x[i] + b->n_x[i] * bounce;
+    const double mirror_y = r->y + b->n_y[i] * bounce;
+    const double mirror_z = b->n_z[i] * bounce - f->focal;
+    /* r.v = w . mirror / (|w| |D|) */
+    const double w_dot_mirror = b->w_x[i] * mirror_x + b->w_y[i] * mirror_y + b->w_z[i] * mirror_z;
+    const double inv_w2_d2 = b->inv_d2[i] * b->inv_w2[i];
     const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
-    const double side_y = w_z * mirror_x - w_x * mirror_z;
-    const double side_z = w_x * mirror_y - w_y * mirror_x;
+    const double side_x = b->w_y[i] * mirror_z - b->w_z[i] * mirror_y;   /* w x mirror, short where the highlight is */
+    const double side_y = b->w_z[i] * mirror_x - b->w_x[i] * mirror_z;
+    const double side_z = b->w_x[i] * mirror_y - b->w_y[i] * mirror_x;
     /* 1 - (r.v)^2, accurate where r.v is near 1 */
     const double sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
-    const double highlight = power_of_cosine(cos2, sin2, f->shininess);   /* max(0, r.v)^n where r.v > 0 */
+
+    b->diffuse[i] = diffuse;
+    b->w_dot_mirror[i] = w_dot_mirror;
+    b->cos2[i] = cos2;
+    b->sin2[i] = sin2;
+}
+
+/* Stage 4: specular [1 call]. Leaves highlight_log2. */
+SYMRENDER_INLINE void stage_4(block *b, int i)
+{
+    /* specular [1 call] */
+    const double highlight_log2 = log2_of_lobe(b->cos2[i], b->sin2[i]);   /* log2 (r.v)^2 */
+
+    b->highlight_log2[i] = highlight_log2;
+}
+
+/* Stage 5: specular [1 call]. Leaves highlight. */
+SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
+{
+    /* specular [1 call]. Phong 1975, Illumination for computer generated pictures */
+    const double highlight = power_of_lobe(b->highlight_log2[i], f->shininess);   /* max(0, r.v)^n where r.v > 0 */
+
+    b->highlight[i] = highlight;
+}
+
+/* Stage 6: specular, intensity [1 mul 2 add 2 select]. Leaves value. */
+SYMRENDER_INLINE void stage_6(const frame *f, block *b, int i)
+{
+    const double highlight = b->highlight[i];
+    const double zero_power = f->zero_power;
+
+    /* specular [1 mul 1 select]. Phong 1975, Illumination for computer generated pictures */
     /* k_s max(0, r.v)^n */
-    const double specular = (w_dot_mirror > 0.0 ? highlight : f->zero_power) * f->specular_gain;
+    const double specular = (b->w_dot_mirror[i] > 0.0 ? highlight : zero_power) * f->specular_gain;
 
     /* intensity [2 add 1 select]. Phong 1975, Illumination for computer generated pictures */
-    const double lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
-    const double value = f->k_ambient + (w2 > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
+    const double lit = b->diffuse[i] + specular;   /* what the light adds; the gains hold its intensity */
+    const double value = f->k_ambient + (b->w2[i] > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
 
-    *sight = facing2;
-    *sure = certainty(facing2, d_dot_d);
-    return value;
+    b->value[i] = value;
+}
+
+/* All stages after the first. */
+SYMRENDER_INLINE void finish(int count, const row *r, const frame *f, block *b)
+{
+    for (int i = 0; i < count; ++i)
+        stage_2(r, f, b, i);
+    for (int i = 0; i < count; ++i)
+        stage_3(r, f, b, i);
+    if (f->half_exponent > 0) {
+        whole_powers_of_lobe(b->sin2, b->highlight_log2, b->highlight, f->half_exponent, count);
+    } else {
+        for (int i = 0; i < count; ++i)
+            stage_4(b, i);
+        for (int i = 0; i < count; ++i)
+            stage_5(f, b, i);
+    }
+    for (int i = 0; i < count; ++i)
+        stage_6(f, b, i);
 }
 
 static inline double at_most(double intensity, double white)
@@ -290,11 +382,14 @@ void off_axis_sphere_double_rows(double *image, ptrdiff_t stride, const symrende
     const double white = grid->white;
     const double background = at_most(scene->background, white);
     const int width = grid->width;
+    block b SYMRENDER_ALIGNED;
+    row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
         double *restrict out = image + j * stride;
         const double plane_y = (top - j) * pixel;
-        const row r = row_of(plane_y * unit, &f);
+        const row r = next;
+        next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
 
         /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
         const double left_end = r.x_left.hi / step - left, right_end = r.x_right.hi / step - left;
@@ -310,11 +405,18 @@ void off_axis_sphere_double_rows(double *image, ptrdiff_t stride, const symrende
 
         const int begin = hits.first <= hits.last ? hits.first : width;
         const int end = hits.first <= hits.last ? hits.last + 1 : width;
+        if (j + 1 < row_end)
+            fetch_ahead(out + stride, (size_t)width * sizeof *out);
         for (int i = 0; i < begin; ++i)
             out[i] = background;
-        for (int i = begin; i < end; ++i) {
-            double sight, sure;
-            out[i] = at_most(shade((i + left) * step, &r, &f, &sight, &sure), white);
+        for (int at = begin, count; at < end; at += count) {
+            count = end - at < POINTS ? end - at : POINTS;
+            const int vectors = whole_vectors(count);
+            for (int i = 0; i < vectors; ++i)
+                stage_1((at + i + left) * step, &r, &f, &b, i);
+            finish(vectors, &r, &f, &b);
+            for (int i = 0; i < count; ++i)
+                out[at + i] = at_most(b.value[i], white);
         }
         for (int i = end; i < width; ++i)
             out[i] = background;
@@ -327,25 +429,55 @@ void off_axis_sphere_double_points(double *values, const double *x, const double
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;
     const double background = at_most(scene->background, white);
+    block b SYMRENDER_ALIGNED;
 
-    for (ptrdiff_t block = 0; block < count; block += POINTS) {
-        const int length = count - block < POINTS ? (int)(count - block) : POINTS;
-        const double *restrict block_x = x + block, *restrict block_y = y + block;
-        double *restrict out = values + block;
-        double doubt[POINTS];
+    for (ptrdiff_t at = 0; at < count; at += POINTS) {
+        const int length = count - at < POINTS ? (int)(count - at) : POINTS;
+        const double *restrict block_x = x + at, *restrict block_y = y + at;
+        double *restrict out = values + at;
+        double facing[POINTS], doubt[POINTS];
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);
-            double sight, sure;
-            const double intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
-            out[i] = at_most(sight > 0.0 ? intensity : background, white);
-            doubt[i] = sure;
+            facing[i] = sight(block_x[i] * unit, &r, &f, &doubt[i]);
+            stage_1(block_x[i] * unit, &r, &f, &b, i);
+        }
+        for (int i = 0; i < length; ++i) {
+            const row r = row_of(block_y[i] * unit, &f);
+            stage_2(&r, &f, &b, i);
+        }
+        for (int i = 0; i < length; ++i) {
+            const row r = row_of(block_y[i] * unit, &f);
+            stage_3(&r, &f, &b, i);
+        }
+        if (f.half_exponent > 0) {
+            whole_powers_of_lobe(b.sin2, b.highlight_log2, b.highlight, f.half_exponent, length);
+        } else {
+            for (int i = 0; i < length; ++i)
+                stage_4(&b, i);
+            for (int i = 0; i < length; ++i)
+                stage_5(&f, &b, i);
         }
         for (int i = 0; i < length; ++i)
-            if (!(doubt[i] > 0.0)) {
-                const row r = row_of(block_y[i] * unit, &f);
-                double sight, sure;
-                const double intensity = shade(block_x[i] * unit, &r, &f, &sight, &sure);
-                out[i] = at_most(hits_exactly(block_x[i], block_y[i], scene) ? intensity : background, white);
-            }
+            stage_6(&f, &b, i);
+        for (int i = 0; i < length; ++i)
+            out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background, white);
+        for (int i = 0; i < length; ++i)
+            if (!(doubt[i] > 0.0))
+                out[i] = at_most(hits_exactly(block_x[i], block_y[i], scene) ? b.value[i] : background, white);
+    }
+}
+
+void off_axis_sphere_double_batch(double *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const off_axis_sphere_double_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end)
+{
+    const int height = grids->height;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : height;
+        off_axis_sphere_double_rows(
+            images + k * image_stride, stride, &grids[k], &scenes[k], begin, end);
     }
 }

@@ -3,10 +3,10 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build shadow --accuracy double
  *
- * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
- *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
- *          wrong
- *          What a ray of the eye hits is exact; the edges of shadows are decided in float64
+ * promise  at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and n <= 1000; another
+ *          kernel draws what this one may not; no overflow; hit or miss never wrong
+ *          What a ray of the eye hits is exact; the edges of shadows are decided in float64; pixels where rounding
+ *          may have decided are listed
  * in       sphere off the axis
  *          diffuse term
  *          specular term
@@ -38,7 +38,8 @@
  *          reach: a pixel: 6 mul 5 add
  *          matte: a pixel: 4 mul 2 add 1 div 1 sqrt 1 max 1 select
  *          glossy: a pixel: 20 mul 9 add 1 div 1 sqrt 1 max 4 select 1 call
- *          shadow: a pixel: 14 mul 12 add 1 select
+ *          gate: a sphere: 1 mul, a pixel: 5 mul 3 add
+ *          shadow: a pixel: 19 mul 15 add 1 select 1 call
  */
 #include "scene_gated_shadow_double.h"
 
@@ -89,9 +90,22 @@ typedef struct {
     double light[POINTS];   /* how much of the lamp's light arrives */
     double cosine[POINTS];   /* max(0, n.l) */
     double lobe[POINTS], shininess[POINTS];   /* max(0, r.v)^n, and n */
+    double margin[POINTS];    /* by how much the closest of its decisions is sure; in doubt where it is not positive */
+    double error[POINTS];     /* what rounding may have done to the value, in units of 2^-53 */
     int count, runs;
     run run[POINTS];
 } points;
+
+/* Rounding moves a point that the eye sees by far less than this, in the unit of its receiver. */
+static const double GRAIN = 0x1p-44;
+
+/* Units of 2^-53 that an intensity of at most 1 may be off: below 1e-15. */
+static const double MOST_ROUNDOFFS = 9.1;
+
+static inline double least(double a, double b)
+{
+    return a < b ? a : b;
+}
 
 /* ---- spheres before the eye: their pixels in a row are one span ---- */
 
@@ -439,8 +453,37 @@ typedef struct {
     double lamp_x, lamp_y, lamp_z;   /* its place from the receiver's origin, in its unit; or its direction */
     double nearness;                 /* 1; 0 for a light in parallel */
     double diffuse_gain[CHANNELS], specular_gain[CHANNELS];   /* I_L k_d, I_L k_s */
+    double keen;                     /* how much closeness magnifies what rounding moves a point by, times GRAIN */
+    double matte_error, gloss_error; /* what it does to the terms, in units of 2^-53 */
+    double steepness;                /* to the highlight: min(1, steepness * highlight) of that */
     int light, terms;
 } lamp;
+
+/* How much a lamp magnifies what rounding does, fitted to the largest errors seen of one sphere under one light. */
+static void set_estimates(lamp *l, const scene_type *scene, int k)
+{
+    /* the closer a light is to the surface, the more its direction changes with the point */
+    double reach = 1.0, away = 1.0;
+    if (l->nearness > 0.0) {
+        reach += sqrt(l->lamp_x * l->lamp_x + l->lamp_y * l->lamp_y + l->lamp_z * l->lamp_z);
+        away = fabs(reach - 2.0);
+    }
+    l->keen = GRAIN * reach / away;
+
+    double diffuse = 0.0, specular = 0.0;   /* of the brightest channel */
+    for (int c = 0; c < CHANNELS; ++c) {
+        diffuse = l->diffuse_gain[c] > diffuse ? l->diffuse_gain[c] : diffuse;
+        specular = l->specular_gain[c] > specular ? l->specular_gain[c] : specular;
+    }
+    l->matte_error = 3.0 * diffuse / away;
+    /* a narrow highlight c^n is steep only where it is bright: n c^(n-1) sin is at most sqrt(n) min(0.61, 3.8 c^n) */
+    const double n = scene->shininess[k];
+    const int is_narrow = n >= 8.0;
+    l->steepness = is_narrow ? 6.3 : 0x1p1000;
+    l->gloss_error = specular * ((is_narrow ? 1.0 : 4.0) + 2.9 * sqrt(n)) * (1.0 + 0.25 / away);
+    if (n > 0.0 && n < 1.0 && specular > 0.0)
+        l->gloss_error = INFINITY;   /* its slope is infinite where it ends */
+}
 
 static lamp lamp_of(const scene_type *scene, int k, int light, int terms)
 {
@@ -474,6 +517,7 @@ static lamp lamp_of(const scene_type *scene, int k, int light, int terms)
         l.diffuse_gain[c] = (intensity * scene->diffuse[CHANNELS * k + c]);
         l.specular_gain[c] = (intensity * scene->specular[CHANNELS * k + c]);
     }
+    set_estimates(&l, scene, k);
     return l;
 }
 
@@ -576,6 +620,8 @@ static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type
         const double past_x = l->lamp_x - gap_x, past_y = l->lamp_y - gap_y, past_z = l->lamp_z - gap_z;
         const int is_within = past_x * past_x + past_y * past_y + past_z * past_z < ratio2;
         const double far = l->nearness > 0.0 && !is_within ? 1.0 : INFINITY;
+        const double gap = sqrt(gap_x * gap_x + gap_y * gap_y + gap_z * gap_z);
+        const double keen = l->keen + GRAIN * (1.0 + gap) / ratio;
         for (int i = r->at; i < r->at + padded(r->count); ++i) {
             /* shadow [14 mul 12 add 1 select]. Lagrange's identity |m|^2 |D|^2 - (m.D)^2 = |m x D|^2 */
             const double b_x = gap_x - p->n_x[i];   /* b, the blocker's centre seen from the point */
@@ -591,7 +637,12 @@ static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type
             const double shade = (((inside2 > 0.0) & (toward > 0.0)) & (far * p->w2[i] - toward > 0.0)) ? 0.0
                 : p->light[i];
 
+            /* margin [5 mul 3 add 1 call] */
+            const double b2 = b_x * b_x + b_y * b_y + b_z * b_z;   /* |b|^2, at least ratio^2 */
+            const double margin = fabs(inside2) - keen * p->w2[i] * b2;   /* not above 0: in doubt */
+
             p->light[i] = shade;
+            p->margin[i] = least(margin, p->margin[i]);
         }
     }
     if (scene->blockers_begin[r->lamp] == scene->blockers_begin[r->lamp + 1])
@@ -605,9 +656,32 @@ static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type
 /* Adds what the run's lamp brings. */
 static void accumulate(points *p, const run *r, const lamp *l)
 {
-    if (l->terms & GATED)
-        for (int i = r->at; i < r->at + padded(r->count); ++i)
+    if (l->terms & GATED) {
+        const double keen = l->keen;
+        /* margin [1 mul] */
+        const double keen_here = keen;
+        const double margin_sphere = keen_here * keen_here;   /* what is the same for a sphere in margin */
+
+        for (int i = r->at; i < r->at + padded(r->count); ++i) {
+            /* gate [3 mul 2 add] */
+            /* |w| n.l */
+            const double n_dot_w = p->n_x[i] * p->w_x[i] + p->n_y[i] * p->w_y[i] + p->n_z[i] * p->w_z[i];
+
+            /* margin [2 mul 1 add] */
+            const double margin = n_dot_w * n_dot_w - p->w2[i] * margin_sphere;   /* not above 0: in doubt */
+
+            const double sure = p->lobe[i] > 0.0 ? margin : INFINITY;
+            p->margin[i] = least(sure, p->margin[i]);
             p->lobe[i] = p->cosine[i] > 0.0 ? p->lobe[i] : 0.0;
+        }
+    }
+    const double matte_error = l->matte_error, gloss_error = l->gloss_error, steepness = l->steepness;
+    for (int i = r->at; i < r->at + padded(r->count); ++i) {
+        const double matte = p->cosine[i] > 0.0 ? matte_error : 0.0;
+        const double steep = l->terms & SPECULAR ? gloss_error * least(1.0, steepness * p->lobe[i]) : 0.0;
+        const double told = matte + steep;
+        p->error[i] += p->light[i] * told;
+    }
     for (int c = 0; c < CHANNELS; ++c) {
         const double diffuse_gain = l->diffuse_gain[c], specular_gain = l->specular_gain[c];
         if (l->terms & SPECULAR)
@@ -638,6 +712,8 @@ static void write_terms(
 static void shade(points *p, const frame *h, int bounces, const layer_set *layers, size_t pixel, size_t pixels)
 {
     const scene_type *scene = h->scene;
+    for (int i = 0; i < p->count; ++i)
+        p->error[i] = 0.0;
     for (const run *r = p->run; r < p->run + p->runs; ++r)
         for (int c = 0; c < CHANNELS; ++c) {
             const double ambient = scene->ambient[CHANNELS * r->receiver + c];
@@ -842,11 +918,32 @@ static void write_geometry(const points *p, const workspace *w, const frame *h, 
     }
 }
 
-/* Shades the points at hand and writes them to the row. */
-static void flush(points *p, const frame *h, double *restrict out, const layer_set *layers, size_t row)
+/* Lists the points in doubt, the i-th from the row's beginning as row + i. Returns how many they are. */
+static ptrdiff_t list_doubtful(const points *p, size_t row, ptrdiff_t *unsettled)
+{
+    ptrdiff_t found = 0;
+    for (const run *r = p->run; r < p->run + p->runs; ++r)
+        for (int i = r->at; i < r->at + r->count; ++i) {
+            double most = 1.0;
+            for (int c = 0; c < CHANNELS; ++c)
+                most = p->value[c][i] > most ? p->value[c][i] : most;
+            if (p->margin[i] > 0.0 && p->error[i] < MOST_ROUNDOFFS * most)
+                continue;
+            unsettled[found++] = (ptrdiff_t)row + r->place + i - r->at;
+        }
+    return found;
+}
+
+/* Shades the points at hand and writes them to the row. Returns how many are in doubt: their numbers are listed. */
+static ptrdiff_t flush(points *p, const frame *h, double *restrict out, const layer_set *layers, size_t row,
+    ptrdiff_t *unsettled)
 {
     const size_t pixels = (size_t)h->grid.width * (size_t)h->grid.height;
     shade(p, h, 0, layers, row, pixels);
+    int doubtful = 0;
+    for (int i = 0; i < p->count; ++i)
+        doubtful += !((p->margin[i] > 0.0) & (p->error[i] < MOST_ROUNDOFFS));
+    const ptrdiff_t listed = doubtful && unsettled ? list_doubtful(p, row, unsettled) : 0;
     const double white = h->white;
     for (int c = 0; c < CHANNELS; ++c)
         for (int i = 0; i < p->count; ++i)
@@ -854,6 +951,7 @@ static void flush(points *p, const frame *h, double *restrict out, const layer_s
     for (const run *r = p->run; r < p->run + p->runs; ++r)
         memcpy(out + r->place, p->value[0] + r->at, (size_t)r->count * sizeof *out);
     p->count = p->runs = 0;
+    return listed;
 }
 
 /* Geometry of a run of points of the sphere in a slot of the row, or of the plane. */
@@ -865,11 +963,15 @@ static void surface(points *p, const workspace *w, const frame *h, int slot, int
     r->at = p->count;
     r->count = count;
     p->count += padded(count);
+    for (int i = r->at; i < p->count; ++i) {
+        p->margin[i] = INFINITY;
+    }
     span_surface(p, r->at, count, first, step, &w->span_rows[slot], &h->spans[receiver], &h->span);
 }
 
-int scene_gated_shadow_double_rows(
-    double *image, ptrdiff_t stride, const frame *h, const layer_set *layers, int row_begin, int row_end)
+ptrdiff_t scene_gated_shadow_double_rows(
+    double *image, ptrdiff_t stride, const frame *h, const layer_set *layers, int row_begin, int row_end,
+    ptrdiff_t *unsettled)
 {
     const scene_type *scene = h->scene;
     const int width = h->grid.width;
@@ -879,6 +981,7 @@ int scene_gated_shadow_double_rows(
     double background[CHANNELS];
     for (int c = 0; c < CHANNELS; ++c)
         background[c] = scene->background[c] > h->grid.white ? h->white : scene->background[c];
+    ptrdiff_t found = 0;
     workspace w;
     if (!take(&w, h, row_begin, row_end, width)) {
         drop(&w);
@@ -945,7 +1048,7 @@ int scene_gated_shadow_double_rows(
             const int receiver = active[owner];
             for (int begin = i, some; begin < end; begin += some) {
                 if (p->count == POINTS)
-                    flush(p, h, out, layers, row);
+                    found += flush(p, h, out, layers, row, unsettled ? unsettled + found : NULL);
                 some = end - begin < POINTS - p->count ? end - begin : POINTS - p->count;
                 p->run[p->runs].place = begin;
                 surface(p, &w, h, owner, receiver, some, begin + left, step);
@@ -954,17 +1057,18 @@ int scene_gated_shadow_double_rows(
             }
         }
         if (p->count > 0)
-            flush(p, h, out, layers, row);
+            found += flush(p, h, out, layers, row, unsettled ? unsettled + found : NULL);
     }
     drop(&w);
-    return 0;
+    return found;
 }
 
-int scene_gated_shadow_double_points(
-    double *values, const double *x, const double *y, ptrdiff_t count, const frame *h)
+ptrdiff_t scene_gated_shadow_double_points(
+    double *values, const double *x, const double *y, ptrdiff_t count, const frame *h, ptrdiff_t *unsettled)
 {
     const scene_type *scene = h->scene;
     const double plane_unit = h->span.plane_unit;
+    ptrdiff_t found = 0;
     workspace w;
     if (!take_for_points(&w, h)) {
         drop(&w);
@@ -996,14 +1100,14 @@ int scene_gated_shadow_double_points(
             continue;
         }
         if (p->count == POINTS || i - (out - values) / CHANNELS > 0x3fffffff) {
-            flush(p, h, out, NULL, 0);
+            found += flush(p, h, out, NULL, (size_t)((out - values) / CHANNELS), unsettled ? unsettled + found : NULL);
             out = values + CHANNELS * i;
         }
         p->run[p->runs].place = (int)(i - (out - values) / CHANNELS);
         surface(p, &w, h, 0, receiver, 1, x[i] * unit, 1.0);
     }
     if (p->count > 0)
-        flush(p, h, out, NULL, 0);
+        found += flush(p, h, out, NULL, (size_t)((out - values) / CHANNELS), unsettled ? unsettled + found : NULL);
     drop(&w);
-    return 0;
+    return found;
 }

@@ -57,14 +57,19 @@ void scene_gated_shadow_double_release(
     scene_gated_shadow_double_frame *frame);
 
 /* Writes rows [row_begin, row_end) of the image; row j starts at image + j * stride. Threads may share a frame and an
- * image. `layers` may be null. Returns 0, or -1 where there is no memory. */
-int scene_gated_shadow_double_rows(double *image, ptrdiff_t stride,
+ * image. `layers` may be null.
+ *
+ * Lists in `unsettled` the pixels, row * width + column, where rounding may have decided what is seen or lit, or done
+ * more than the level promises; it has room for every pixel of these rows, or is null. What is written there is the
+ * kernel's best guess. Returns how many it listed, or -1 where there is no memory. */
+ptrdiff_t scene_gated_shadow_double_rows(double *image, ptrdiff_t stride,
     const scene_gated_shadow_double_frame *frame,
-    const scene_gated_shadow_double_layers *layers, int row_begin, int row_end);
+    const scene_gated_shadow_double_layers *layers, int row_begin, int row_end, ptrdiff_t *unsettled);
 
-/* Writes the intensities at points (x[i], y[i]) of the image plane. Returns 0, or -1 where there is no memory. */
-int scene_gated_shadow_double_points(double *values, const double *x, const double *y,
-    ptrdiff_t count, const scene_gated_shadow_double_frame *frame);
+/* Writes the intensities at points (x[i], y[i]) of the image plane. `unsettled`, and what is returned, as for
+ * rows, by the numbers of points. */
+ptrdiff_t scene_gated_shadow_double_points(double *values, const double *x, const double *y,
+    ptrdiff_t count, const scene_gated_shadow_double_frame *frame, ptrdiff_t *unsettled);
 
 #ifdef __cplusplus
 }

@@ -3,11 +3,11 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build mirrors --accuracy double
  *
- * promise  about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated
- *          highlight may be switched wrongly within rounding of the terminator); no overflow; hit or miss never
- *          wrong
+ * promise  at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and n <= 1000; another
+ *          kernel draws what this one may not; no overflow; hit or miss never wrong
  *          What a ray of the eye hits is exact; which of two intersecting surfaces is in front, the horizon of the
- *          plane, the edges of tiles, the edges of shadows and what mirrors show are decided in float64
+ *          plane, the edges of tiles, the edges of shadows and what mirrors show are decided in float64; pixels
+ *          where rounding may have decided are listed
  * in       sphere off the axis
  *          diffuse term
  *          specular term
@@ -35,16 +35,17 @@
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
  * ops      span: a frame: 3 mul 1 div 4 call, a sphere: 10 mul 7 add 3 div 2 sqrt 2 max 34 call, a row: 21 mul 12
  *            add 1 sqrt 2 max 18 call, a pixel: 24 mul 21 add 2 div 2 sqrt 1 max
- *          plane: a frame: 2 mul 3 call, a row: 2 mul, a pixel: 6 mul 7 add 5 div 1 sqrt
- *          tiles: a pixel: 8 mul 8 add 3 call
+ *          plane: a frame: 3 mul 3 call, a row: 3 mul 1 call, a pixel: 11 mul 14 add 5 div 2 sqrt 2 call
+ *          tiles: a frame: 2 add, a pixel: 9 mul 14 add 1 max 5 call
  *          lamp: a sphere: 3 add 3 div 6 call
  *          reach: a pixel: 6 mul 5 add
  *          matte: a pixel: 4 mul 2 add 1 div 1 sqrt 1 max 1 select
  *          glossy: a pixel: 20 mul 9 add 1 div 1 sqrt 1 max 4 select 1 call
- *          shadow: a pixel: 14 mul 12 add 1 select
- *          echo: a pixel: 22 mul 17 add 1 div 1 sqrt 1 max
- *          arrival: a pixel: 31 mul 20 add 1 div 1 sqrt 1 max
- *          echo_plane: a pixel: 20 mul 16 add 2 div
+ *          gate: a pixel: 7 mul 3 add
+ *          shadow: a pixel: 20 mul 15 add 1 select 1 call
+ *          echo: a pixel: 24 mul 19 add 1 div 1 sqrt 1 max 1 call
+ *          arrival: a pixel: 45 mul 28 add 3 div 2 sqrt 2 max
+ *          echo_plane: a pixel: 30 mul 21 add 3 div 4 call
  *          gradient: a pixel: 7 mul 5 add 1 div 1 sqrt
  */
 #include "scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double.h"
@@ -96,13 +97,29 @@ typedef struct {
     double light[POINTS];   /* how much of the lamp's light arrives */
     double cosine[POINTS];   /* max(0, n.l) */
     double lobe[POINTS], shininess[POINTS];   /* max(0, r.v)^n, and n */
+    double margin[POINTS];    /* by how much the closest of its decisions is sure; in doubt where it is not positive */
+    double error[POINTS];     /* what rounding may have done to the value, in units of 2^-53 */
+    double blur[POINTS];      /* how far rounding moves it, in units of GRAIN; of a sphere that the eye sees: 1 */
+    double drift[POINTS];     /* how far it moves its mirrored ray aside, */
+    double turn[POINTS];      /* and how much it turns that and its normal; seen by the eye: 1 */
     double nearest[POINTS];   /* the distance of what is seen in this point's mirror, in lengths of its ray, */
-    int seen[POINTS];         /* and which receiver it is; -1: none */
+    ptrdiff_t seen[POINTS];   /* and which receiver it is, in a number as wide; -1: none */
     double weight[POINTS];    /* how much of this point is added */
     int from[POINTS];         /* to which one that sees it in its mirror */
     int count, runs;
     run run[POINTS];
 } points;
+
+/* Rounding moves a point that the eye sees by far less than this, in the unit of its receiver. */
+static const double GRAIN = 0x1p-44;
+
+/* Units of 2^-53 that an intensity of at most 1 may be off: below 1e-15. */
+static const double MOST_ROUNDOFFS = 9.1;
+
+static inline double least(double a, double b)
+{
+    return a < b ? a : b;
+}
 
 /* ---- spheres before the eye: their pixels in a row are one span ---- */
 
@@ -448,7 +465,7 @@ static void span_surface(points *p, int at, int count, double first, double step
 
 /* What does not change within a frame. */
 typedef struct {
-    double plane_unit, focal, descent_frame, d_dot_d_frame, n_x, n_y, n_z, plane_x, plane_y, plane_z;
+    double plane_unit, focal, descent_frame, d_dot_d_frame, n_x, n_y, n_z, margin_frame, plane_x, plane_y, plane_z;
 } plane_frame;
 
 static plane_frame plane_frame_of(const scene_type *scene)
@@ -466,6 +483,9 @@ static plane_frame plane_frame_of(const scene_type *scene)
     const double n_y = scene->plane_y;
     const double n_z = scene->plane_z;
 
+    /* margin [1 mul] */
+    const double margin_frame = -(5.684341886080802e-14 * focal);   /* what is the same for a frame in margin */
+
     const plane_frame carried = {
         .plane_unit = plane_unit,
         .focal = focal,
@@ -474,6 +494,7 @@ static plane_frame plane_frame_of(const scene_type *scene)
         .n_x = n_x,
         .n_y = n_y,
         .n_z = n_z,
+        .margin_frame = margin_frame,
         .plane_x = scene->plane_x,
         .plane_y = scene->plane_y,
         .plane_z = scene->plane_z,
@@ -483,7 +504,7 @@ static plane_frame plane_frame_of(const scene_type *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double y, descent_row, d_dot_d_row;
+    double y, descent_row, d_dot_d_row, margin_row;
 } plane_row;
 
 SYMRENDER_INLINE plane_row plane_row_of(double y, const plane_frame *f)
@@ -492,10 +513,14 @@ SYMRENDER_INLINE plane_row plane_row_of(double y, const plane_frame *f)
     const double descent_row = -(f->plane_y * y);   /* what is the same for a row in descent */
     const double d_dot_d_row = y * y;   /* what is the same for a row in d_dot_d */
 
+    /* margin [1 mul 1 call] */
+    const double margin_row = -(5.684341886080802e-14 * fabs(y));   /* what is the same for a row in margin */
+
     const plane_row carried = {
         .y = y,
         .descent_row = descent_row,
         .d_dot_d_row = d_dot_d_row,
+        .margin_row = margin_row,
     };
     return carried;
 }
@@ -532,6 +557,11 @@ static void plane_surface(points *p, int at, int count, double first, double ste
         const double mirror_y = r->y + f->plane_y * bounce;
         const double mirror_z = f->plane_z * bounce - f->focal;
 
+        /* margin [4 mul 4 add 1 sqrt] */
+        const double share_2 = p_x * p_x + p_y * p_y + p_z * p_z;
+        const double blurred = 1.0 + share_2;   /* far away rounding moves the point along the ray by |p|^2 */
+        const double drifted = 1.0 + 2.0 * sqrt(share_2);   /* and the mirrored ray aside by |p| */
+
         p->n_x[at + i] = f->n_x;
         p->n_y[at + i] = f->n_y;
         p->n_z[at + i] = f->n_z;
@@ -542,6 +572,8 @@ static void plane_surface(points *p, int at, int count, double first, double ste
         p->mirror_y[at + i] = mirror_y;
         p->mirror_z[at + i] = mirror_z;
         p->inv_d2[at + i] = inv_d2;
+        p->blur[at + i] = blurred;
+        p->drift[at + i] = drifted;
     }
 }
 
@@ -554,8 +586,42 @@ typedef struct {
     double lamp_x, lamp_y, lamp_z;   /* its place from the receiver's origin, in its unit; or its direction */
     double nearness;                 /* 1; 0 for a light in parallel */
     double diffuse_gain[CHANNELS], specular_gain[CHANNELS];   /* I_L k_d, I_L k_s */
+    double keen;                     /* how much closeness magnifies what rounding moves a point by, times GRAIN */
+    double matte_error, gloss_error; /* what it does to the terms, in units of 2^-53 */
+    double turned_error;             /* and to the first, beyond a mirror that turned the normal with the ray */
+    double steepness;                /* to the highlight: min(1, steepness * highlight) of that */
     int light, terms;
 } lamp;
+
+/* How much a lamp magnifies what rounding does, fitted to the largest errors seen of one sphere under one light. */
+static void set_estimates(lamp *l, const scene_type *scene, int k)
+{
+    /* the closer a light is to the surface, the more its direction changes with the point */
+    double reach = 1.0, away = 1.0;
+    if (l->nearness > 0.0) {
+        reach += sqrt(l->lamp_x * l->lamp_x + l->lamp_y * l->lamp_y + l->lamp_z * l->lamp_z);
+        away = fabs(reach - 2.0);
+        if (k >= scene->spheres)
+            away = fabs(
+                1.0 + scene->plane_x * l->lamp_x + scene->plane_y * l->lamp_y + scene->plane_z * l->lamp_z);
+    }
+    l->keen = GRAIN * reach / away;
+
+    double diffuse = 0.0, specular = 0.0;   /* of the brightest channel */
+    for (int c = 0; c < CHANNELS; ++c) {
+        diffuse = l->diffuse_gain[c] > diffuse ? l->diffuse_gain[c] : diffuse;
+        specular = l->specular_gain[c] > specular ? l->specular_gain[c] : specular;
+    }
+    l->matte_error = 3.0 * diffuse / away;
+    l->turned_error = k < scene->spheres ? 3.4 * diffuse : 0.0;
+    /* a narrow highlight c^n is steep only where it is bright: n c^(n-1) sin is at most sqrt(n) min(0.61, 3.8 c^n) */
+    const double n = scene->shininess[k];
+    const int is_narrow = n >= 8.0;
+    l->steepness = is_narrow ? 6.3 : 0x1p1000;
+    l->gloss_error = specular * ((is_narrow ? 1.0 : 4.0) + 2.9 * sqrt(n)) * (1.0 + 0.25 / away);
+    if (n > 0.0 && n < 1.0 && specular > 0.0)
+        l->gloss_error = INFINITY;   /* its slope is infinite where it ends */
+}
 
 static lamp lamp_of(const scene_type *scene, int k, int light, int terms)
 {
@@ -589,6 +655,7 @@ static lamp lamp_of(const scene_type *scene, int k, int light, int terms)
         l.diffuse_gain[c] = (intensity * scene->diffuse[CHANNELS * k + c]);
         l.specular_gain[c] = (intensity * scene->specular[CHANNELS * k + c]);
     }
+    set_estimates(&l, scene, k);
     return l;
 }
 
@@ -601,6 +668,7 @@ struct scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_frame {
     plane_frame plane;
     int *row_first, *row_last;   /* [visible] the rows that may show a sphere */
     lamp *lamps;
+    double tile_keen;             /* what GRAIN is of a tile */
 };
 
 /* w from every point of the run to its lamp. */
@@ -692,6 +760,8 @@ static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type
         const double past_x = l->lamp_x - gap_x, past_y = l->lamp_y - gap_y, past_z = l->lamp_z - gap_z;
         const int is_within = past_x * past_x + past_y * past_y + past_z * past_z < ratio2;
         const double far = l->nearness > 0.0 && !is_within ? 1.0 : INFINITY;
+        const double gap = sqrt(gap_x * gap_x + gap_y * gap_y + gap_z * gap_z);
+        const double keen = l->keen + GRAIN * (1.0 + gap) / ratio;
         for (int i = r->at; i < r->at + padded(r->count); ++i) {
             /* shadow [14 mul 12 add 1 select]. Lagrange's identity |m|^2 |D|^2 - (m.D)^2 = |m x D|^2 */
             const double b_x = gap_x - p->p_x[i];   /* b, the blocker's centre seen from the point */
@@ -707,7 +777,12 @@ static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type
             const double shade = (((inside2 > 0.0) & (toward > 0.0)) & (far * p->w2[i] - toward > 0.0)) ? 0.0
                 : p->light[i];
 
+            /* margin [6 mul 3 add 1 call] */
+            const double b2 = b_x * b_x + b_y * b_y + b_z * b_z;   /* |b|^2, at least ratio^2 */
+            const double margin = fabs(inside2) - p->blur[i] * keen * p->w2[i] * b2;   /* not above 0: in doubt */
+
             p->light[i] = shade;
+            p->margin[i] = least(margin, p->margin[i]);
         }
     }
     if (scene->blockers_begin[r->lamp] == scene->blockers_begin[r->lamp + 1])
@@ -721,9 +796,32 @@ static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type
 /* Adds what the run's lamp brings. */
 static void accumulate(points *p, const run *r, const lamp *l)
 {
-    if (l->terms & GATED)
-        for (int i = r->at; i < r->at + padded(r->count); ++i)
+    if (l->terms & GATED) {
+        const double keen = l->keen;
+
+        for (int i = r->at; i < r->at + padded(r->count); ++i) {
+            /* gate [3 mul 2 add] */
+            /* |w| n.l */
+            const double n_dot_w = p->n_x[i] * p->w_x[i] + p->n_y[i] * p->w_y[i] + p->n_z[i] * p->w_z[i];
+
+            /* margin [4 mul 1 add] */
+            const double keen_here = p->blur[i] * keen;
+            const double margin = n_dot_w * n_dot_w - p->w2[i] * (keen_here * keen_here);   /* not above 0: in doubt */
+
+            const double sure = p->lobe[i] > 0.0 ? margin : INFINITY;
+            p->margin[i] = least(sure, p->margin[i]);
             p->lobe[i] = p->cosine[i] > 0.0 ? p->lobe[i] : 0.0;
+        }
+    }
+    const double matte_error = l->matte_error, gloss_error = l->gloss_error, steepness = l->steepness;
+    const double turned_error = l->turned_error;
+    for (int i = r->at; i < r->at + padded(r->count); ++i) {
+        const double matte = p->cosine[i] > 0.0 ? matte_error : 0.0;
+        const double steep = l->terms & SPECULAR ? gloss_error * least(1.0, steepness * p->lobe[i]) : 0.0;
+        const double told = matte + steep;
+        const double turned = p->turn[i] - 1.0;
+        p->error[i] += p->light[i] * (told + turned * (told + turned_error));
+    }
     for (int c = 0; c < CHANNELS; ++c) {
         const double diffuse_gain = l->diffuse_gain[c], specular_gain = l->specular_gain[c];
         if (l->terms & SPECULAR)
@@ -770,18 +868,30 @@ static inline double backdrop(const scene_type *scene, double height, int c)
 }
 
 /* Which of the plane's two materials is at a point of it: 0 on even tiles, 1 on odd ones. */
-static inline int parity_of(double p_x, double p_y, double p_z, const scene_type *scene)
+static inline int parity_of(double p_x, double p_y, double p_z, double blur, double *sure, const frame *h)
 {
+    const scene_type *scene = h->scene;
+    const double keen = h->tile_keen;
     const double across_x = scene->across_x, across_y = scene->across_y, across_z = scene->across_z;
     const double along_x = scene->along_x, along_y = scene->along_y, along_z = scene->along_z;
     const double across_0 = scene->across_0, along_0 = scene->along_0;
     /* tiles [8 mul 8 add 3 call] */
-    /* number of the tile across */
-    const double tile_u = floor(across_0 + across_x * p_x + across_y * p_y + across_z * p_z);
-    const double tile_v = floor(along_0 + along_x * p_x + along_y * p_y + along_z * p_z);   /* and along the axis */
+    const double share_1 = across_x * p_x + across_y * p_y + across_z * p_z;
+    const double tile_u = floor(across_0 + share_1);   /* number of the tile across */
+    const double share_2 = along_x * p_x + along_y * p_y + along_z * p_z;
+    const double tile_v = floor(along_0 + share_2);   /* and along the axis */
     const double tile = tile_u + tile_v;
     const double parity = tile - 2.0 * floor(0.5 * tile);   /* even: 0, odd: 1 */
 
+    /* margin [1 mul 8 add 1 max 2 call] */
+    const double from_middle_frame = across_0 - 0.5;   /* what is the same for a frame in from_middle */
+    const double from_middle_frame_1 = along_0 - 0.5;   /* what is the same for a frame in from_middle */
+    /* from the middle of the tile, 1/2 at its edge */
+    const double from_middle = fabs(share_1 + from_middle_frame - tile_u) > fabs(share_2 + from_middle_frame_1
+        - tile_v) ? fabs(share_1 + from_middle_frame - tile_u) : fabs(share_2 + from_middle_frame_1 - tile_v);
+    const double margin = 0.5 - blur * keen - from_middle;   /* not above 0: in doubt */
+
+    *sure = least(margin, *sure);
     return parity > 0.5;
 }
 
@@ -795,7 +905,8 @@ static void find_in_mirror(points *p, const run *q, int k, const scene_type *sce
     const double link_x = (scene->center_x[k] - scene->center_x[of]) / reach;
     const double link_y = (scene->center_y[k] - scene->center_y[of]) / reach;
     const double link_z = (scene->center_z[k] - scene->center_z[of]) / reach;
-    for (int i = q->at; i < q->at + q->count; ++i) {
+    const double keen = 2.0 * GRAIN * (2.0 * shrink + sqrt(link_x * link_x + link_y * link_y + link_z * link_z));
+    for (int i = q->at, end = q->at + q->count; i < end; ++i) {
         /* mirrored ray and sphere [22 mul 17 add 1 div 1 sqrt 1 max]. Lagrange's identity |m|^2 |D|^2 - (m.D)^2 =
          * |m x D|^2 */
         const double m_x = link_x - p->p_x[i] * shrink;   /* m, the centre seen from the point, in radii */
@@ -814,7 +925,12 @@ static void find_in_mirror(points *p, const run *q, int k, const scene_type *sce
         /* distance in lengths of d */
         const double t = reach * (m_x * m_x + m_y * m_y + m_z * m_z - 1.0) / (ahead + facing);
 
+        /* margin [2 mul 2 add 1 call] */
+        const double margin = fabs(disc) - keen * (p->drift[i] + p->turn[i]) * d2;   /* not above 0: in doubt */
+
         const int is_nearer = (disc >= 0.0) & (ahead > 0.0) & (t < p->nearest[i]);
+        const int is_tie = (disc >= 0.0) & (ahead > 0.0) & (fabs(t - p->nearest[i]) < 0x1p-24 * t);
+        p->margin[i] = is_tie ? 0.0 : (ahead > 0.0 ? least(margin, p->margin[i]) : p->margin[i]);
         p->nearest[i] = is_nearer ? t : p->nearest[i];
         p->seen[i] = is_nearer ? k : p->seen[i];
     }
@@ -856,6 +972,15 @@ static void arrive(points *child, const run *q, const points *p, int of, const s
         const double next_y = p->mirror_y[i] + n_y * bounce;
         const double next_z = p->mirror_z[i] + n_z * bounce;
 
+        /* margin [14 mul 8 add 2 div 1 sqrt 1 max] */
+        const double d_size = sqrt(d2 > 0.0 ? d2 : 0.0);   /* |d| */
+        const double ahead = p->mirror_x[i] * m_x + p->mirror_y[i] * m_y + p->mirror_z[i] * m_z;   /* m.d */
+        /* the ray's way, in radii */
+        const double travelled = (m_x * m_x + m_y * m_y + m_z * m_z - 1.0) * d_size / (facing + ahead);
+        /* how far rounding moves the new point: more at grazing rays */
+        const double drifted = 1.0 + d_size * (0.25 * 3.0 * p->drift[i] * shrink + 0.5 * 3.0 * p->turn[i] * travelled)
+            / facing;
+
         child->n_x[j] = n_x;
         child->n_y[j] = n_y;
         child->n_z[j] = n_z;
@@ -866,19 +991,21 @@ static void arrive(points *child, const run *q, const points *p, int of, const s
         child->p_y[j] = n_y;
         child->p_z[j] = n_z;
         child->inv_d2[j] = inv_d2;
+        child->blur[j] = child->drift[j] = child->turn[j] = drifted;
     }
 }
 
 /* Where the rays mirrored at a run's points meet the plane, if that is nearer than what they met before. */
-static void find_plane_in_mirror(points *p, const run *q, const scene_type *scene)
+static void find_plane_in_mirror(points *p, const run *q, const frame *h)
 {
+    const scene_type *scene = h->scene;
     const int of = q->receiver;
     const double plane_x = scene->plane_x, plane_y = scene->plane_y, plane_z = scene->plane_z;
     const double height = scene->radius[scene->spheres], scale = scene->radius[of] / height;
     const double origin_x = (scene->center_x[of] - scene->center_x[scene->spheres]) / height;
     const double origin_y = (scene->center_y[of] - scene->center_y[scene->spheres]) / height;
     const double origin_z = (scene->center_z[of] - scene->center_z[scene->spheres]) / height;
-    for (int i = q->at; i < q->at + q->count; ++i) {
+    for (int i = q->at, end = q->at + q->count; i < end; ++i) {
         /* mirrored ray and plane [13 mul 11 add 1 div] */
         const double o_x = origin_x + p->p_x[i] * scale;   /* the point seen from the eye */
         const double o_y = origin_y + p->p_y[i] * scale;
@@ -892,9 +1019,22 @@ static void find_plane_in_mirror(points *p, const run *q, const scene_type *scen
         const double foot_y = o_y + p->mirror_y[i] * t_plane;
         const double foot_z = o_z + p->mirror_z[i] * t_plane;
 
+        /* margin [10 mul 5 add 1 div 4 call] */
+        const double d_size = fabs(p->mirror_x[i]) + fabs(p->mirror_y[i]) + fabs(p->mirror_z[i]);   /* at least |d| */
+        const double travelled = t_plane * d_size;   /* the ray's way, in heights */
+        const double margin = fabs(descent) - 5.684341886080802e-14 * p->turn[i] * d_size;   /* not above 0: in doubt */
+        /* how far rounding moves the ray aside */
+        const double drifted = 1.0 + 0.25 * 3.0 * p->drift[i] * scale + 0.5 * 3.0 * p->turn[i] * travelled;
+        const double blurred = d_size * drifted / descent;   /* and so the foot, along the plane */
+
         const int is_nearer = (descent > 0.0) & (t < p->nearest[i]);
+        const int is_tie = (descent > 0.0) & (fabs(t - p->nearest[i]) < 0x1p-24 * t);
+        p->margin[i] = is_tie ? 0.0 : least(margin, p->margin[i]);
         p->nearest[i] = is_nearer ? t : p->nearest[i];
-        p->seen[i] = is_nearer ? scene->spheres + parity_of(foot_x, foot_y, foot_z, scene) : p->seen[i];
+        double sure = p->margin[i];
+        const int tile = parity_of(foot_x, foot_y, foot_z, blurred, &sure, h);
+        p->margin[i] = is_nearer ? sure : p->margin[i];
+        p->seen[i] = is_nearer ? scene->spheres + tile : p->seen[i];
     }
 }
 
@@ -926,6 +1066,13 @@ static void arrive_on_plane(points *child, const run *q, const points *p, int of
         const double next_y = p->mirror_y[i] + plane_y * bounce;
         const double next_z = p->mirror_z[i] + plane_z * bounce;
 
+        /* margin [8 mul 4 add 1 div 3 call] */
+        const double d_size = fabs(p->mirror_x[i]) + fabs(p->mirror_y[i]) + fabs(p->mirror_z[i]);   /* at least |d| */
+        const double travelled = t_plane * d_size;   /* the ray's way, in heights */
+        /* how far rounding moves the ray aside */
+        const double drifted = 1.0 + 0.25 * 3.0 * p->drift[i] * scale + 0.5 * 3.0 * p->turn[i] * travelled;
+        const double blurred = d_size * drifted / descent;   /* and so the foot, along the plane */
+
         child->p_x[j] = foot_x;
         child->p_y[j] = foot_y;
         child->p_z[j] = foot_z;
@@ -936,6 +1083,8 @@ static void arrive_on_plane(points *child, const run *q, const points *p, int of
         child->n_y[j] = plane_y;
         child->n_z[j] = plane_z;
         child->inv_d2[j] = inv_d2;
+        child->blur[j] = blurred;
+        child->drift[j] = child->turn[j] = drifted;
     }
 }
 
@@ -948,6 +1097,12 @@ static void flush_mirror(points *p, const frame *h, int bounces)
         for (int c = 0; c < CHANNELS; ++c)
             for (int j = r->at; j < r->at + r->count; ++j)
                 p->value[c][child->from[j]] += child->weight[j] * child->value[c][j];
+    for (const run *r = child->run; r < child->run + child->runs; ++r)
+        for (int j = r->at; j < r->at + r->count; ++j) {
+            const int i = child->from[j];
+            p->margin[i] = least(child->margin[j], p->margin[i]);
+            p->error[i] += child->weight[j] * child->error[j];
+        }
     child->count = child->runs = 0;
 }
 
@@ -969,6 +1124,7 @@ static void follow(points *p, const run *q, int k, double weight, const frame *h
             if (p->seen[i] == k) {
                 child->from[next->at + next->count] = i;
                 child->weight[next->at + next->count] = weight;
+                child->margin[next->at + next->count] = INFINITY;
                 ++next->count;
             }
         if (next->count == 0)
@@ -999,7 +1155,7 @@ static void reflect(points *p, const frame *h, int bounces)
         for (int m = scene->mirrors_begin[q->receiver]; m < scene->mirrors_begin[q->receiver + 1]; ++m)
             find_in_mirror(p, q, scene->mirrors[m], scene);
         if (scene->mirror_plane[q->receiver])
-            find_plane_in_mirror(p, q, scene);
+            find_plane_in_mirror(p, q, h);
         double height[POINTS];
         for (int i = q->at; i < q->at + padded(q->count); ++i)
             height[i] = height_of(scene, p->mirror_x[i], p->mirror_y[i], p->mirror_z[i]);
@@ -1022,6 +1178,8 @@ static void reflect(points *p, const frame *h, int bounces)
 static void shade(points *p, const frame *h, int bounces, const layer_set *layers, size_t pixel, size_t pixels)
 {
     const scene_type *scene = h->scene;
+    for (int i = 0; i < p->count; ++i)
+        p->error[i] = 0.0;
     for (const run *r = p->run; r < p->run + p->runs; ++r)
         for (int c = 0; c < CHANNELS; ++c) {
             const double ambient = scene->ambient[CHANNELS * r->receiver + c];
@@ -1122,6 +1280,9 @@ frame *scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_prepare(const scene_t
     for (int k = 0; k < scene->receivers; ++k)
         for (int l = scene->lamps_begin[k]; l < scene->lamps_begin[k + 1]; ++l)
             h->lamps[l] = lamp_of(scene, k, scene->lamp_light[l], scene->lamp_terms[l]);
+    h->tile_keen = GRAIN * (
+        fabs(scene->across_x) + fabs(scene->across_y) + fabs(scene->across_z) + fabs(scene->across_0)
+        + fabs(scene->along_x) + fabs(scene->along_y) + fabs(scene->along_z) + fabs(scene->along_0));
     return h;
 }
 
@@ -1142,6 +1303,7 @@ void scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_release(frame *h)
 typedef struct {
     points *points;     /* one for each level of mirrors */
     int *owner;         /* [width] which of the row's spheres a pixel shows; then the plane's materials; -1: none */
+    double *margin;     /* [width] how sure that is */
     int *start;         /* [rows + 1] where each row's list of spheres begins in */
     int *active;        /* the spheres that may show in each row, front to back */
     span_row *span_rows;   /* [most in a row] */
@@ -1151,6 +1313,7 @@ static void drop(workspace *w)
 {
     free(w->points);
     free(w->owner);
+    free(w->margin);
     free(w->start);
     free(w->active);
     free(w->span_rows);
@@ -1163,7 +1326,8 @@ static int take(workspace *w, const frame *h, int row_begin, int row_end, int wi
     *w = none;
     w->points = array((size_t)h->scene->bounces + 1, sizeof *w->points);
     w->owner = array((size_t)width, sizeof *w->owner);
-    if (!w->points || !w->owner)
+    w->margin = array((size_t)width, sizeof *w->margin);
+    if (!w->points || !w->owner || !w->margin)
         return 0;
     const int rows = row_end - row_begin;
     size_t most = 0;
@@ -1216,16 +1380,24 @@ static double depth_of(const workspace *w, const frame *h, int slot, int k, doub
     return radii * h->scene->radius[k];
 }
 
+/* Is it the nearer of two depths? *sure tells how sure that is. */
+static inline int is_before(double depth, double other, double *sure)
+{
+    *sure = least(fabs(depth - other) - 0x1p-40 * depth, *sure);
+    return depth < other;
+}
+
 /* Is sphere k, which is hit, seen at x although another one may own the pixel? Disjoint spheres are painted front to
  * back, so that the owner is in front.
  * What is below the plane is not seen. */
 static int is_seen(const workspace *w, const frame *h, const int *active, int slot, int owner,
-    double x, const plane_row *ground)
+    double x, const plane_row *ground, double *sure)
 {
     const scene_type *scene = h->scene;
     const int k = active[slot];
     if (scene->crosses_plane[k]
-        && plane_distance(x, ground, &h->plane) * scene->radius[scene->spheres] < depth_of(w, h, slot, k, x))
+        && !is_before(
+            depth_of(w, h, slot, k, x), plane_distance(x, ground, &h->plane) * scene->radius[scene->spheres], sure))
         return 0;
     if (owner < 0)
         return 1;
@@ -1233,7 +1405,7 @@ static int is_seen(const workspace *w, const frame *h, const int *active, int sl
 }
 
 /* The place among the owners of the plane's material where the ray through x meets it, from `first` on; -1 for none. */
-static int ground_at(double x, const plane_row *r, const frame *h, int first)
+static int ground_at(double x, const plane_row *r, const frame *h, int first, double *sure)
 {
     const plane_frame *f = &h->plane;
     /* ground plane [1 mul 2 add 3 div] */
@@ -1243,7 +1415,14 @@ static int ground_at(double x, const plane_row *r, const frame *h, int first)
     const double p_y = r->y / descent;
     const double p_z = -(f->focal / descent);
 
-    return descent > 0.0 ? first + parity_of(p_x, p_y, p_z, h->scene) : -1;
+    /* margin [4 mul 6 add 2 call] */
+    /* not above 0: in doubt */
+    const double margin = fabs(descent) + f->margin_frame + r->margin_row - 5.684341886080802e-14 * fabs(x);
+    const double share_2 = p_x * p_x + p_y * p_y + p_z * p_z;
+    const double blurred = 1.0 + share_2;   /* far away rounding moves the point along the ray by |p|^2 */
+
+    *sure = least(margin, *sure);
+    return descent > 0.0 ? first + parity_of(p_x, p_y, p_z, blurred, sure, h) : -1;
 }
 
 /* Depth, normal, index and ambient term of the last run, which the pixels of one owner in this row make up. */
@@ -1273,11 +1452,32 @@ static void write_geometry(const points *p, const workspace *w, const frame *h, 
     }
 }
 
-/* Shades the points at hand and writes them to the row. */
-static void flush(points *p, const frame *h, double *restrict out, const layer_set *layers, size_t row)
+/* Lists the points in doubt, the i-th from the row's beginning as row + i. Returns how many they are. */
+static ptrdiff_t list_doubtful(const points *p, size_t row, ptrdiff_t *unsettled)
+{
+    ptrdiff_t found = 0;
+    for (const run *r = p->run; r < p->run + p->runs; ++r)
+        for (int i = r->at; i < r->at + r->count; ++i) {
+            double most = 1.0;
+            for (int c = 0; c < CHANNELS; ++c)
+                most = p->value[c][i] > most ? p->value[c][i] : most;
+            if (p->margin[i] > 0.0 && p->error[i] < MOST_ROUNDOFFS * most)
+                continue;
+            unsettled[found++] = (ptrdiff_t)row + r->place + i - r->at;
+        }
+    return found;
+}
+
+/* Shades the points at hand and writes them to the row. Returns how many are in doubt: their numbers are listed. */
+static ptrdiff_t flush(points *p, const frame *h, double *restrict out, const layer_set *layers, size_t row,
+    ptrdiff_t *unsettled)
 {
     const size_t pixels = (size_t)h->grid.width * (size_t)h->grid.height;
     shade(p, h, h->scene->bounces, layers, row, pixels);
+    int doubtful = 0;
+    for (int i = 0; i < p->count; ++i)
+        doubtful += !((p->margin[i] > 0.0) & (p->error[i] < MOST_ROUNDOFFS));
+    const ptrdiff_t listed = doubtful && unsettled ? list_doubtful(p, row, unsettled) : 0;
     const double white = h->white;
     for (int c = 0; c < CHANNELS; ++c)
         for (int i = 0; i < p->count; ++i)
@@ -1287,17 +1487,23 @@ static void flush(points *p, const frame *h, double *restrict out, const layer_s
             for (int c = 0; c < CHANNELS; ++c)
                 out[CHANNELS * (r->place + i) + c] = p->value[c][r->at + i];
     p->count = p->runs = 0;
+    return listed;
 }
 
 /* Geometry of a run of points of the sphere in a slot of the row, or of the plane. */
 static void surface(points *p, const workspace *w, const frame *h, int slot, int receiver, int count,
-    double first, double step, const plane_row *ground)
+    double first, double step, const plane_row *ground, const double *sure)
 {
     run *r = &p->run[p->runs++];
     r->receiver = receiver;
     r->at = p->count;
     r->count = count;
     p->count += padded(count);
+    for (int i = r->at; i < p->count; ++i) {
+        p->margin[i] = i < r->at + count ? sure[i - r->at] : INFINITY;
+        p->blur[i] = 1.0;
+        p->drift[i] = p->turn[i] = 1.0;
+    }
     if (receiver >= h->scene->spheres) {
         plane_surface(p, r->at, count, first, step, ground, &h->plane);
         return;
@@ -1305,14 +1511,16 @@ static void surface(points *p, const workspace *w, const frame *h, int slot, int
     span_surface(p, r->at, count, first, step, &w->span_rows[slot], &h->spans[receiver], &h->span);
 }
 
-int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
-    double *image, ptrdiff_t stride, const frame *h, const layer_set *layers, int row_begin, int row_end)
+ptrdiff_t scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
+    double *image, ptrdiff_t stride, const frame *h, const layer_set *layers, int row_begin, int row_end,
+    ptrdiff_t *unsettled)
 {
     const scene_type *scene = h->scene;
     const int width = h->grid.width;
     const double unit = h->span.plane_unit;
     const double pixel = h->grid.pixel, step = pixel * unit, steps = 1.0 / step;
     const double left = 0.5 - 0.5 * width, top = 0.5 * h->grid.height - 0.5;
+    ptrdiff_t found = 0;
     workspace w;
     if (!take(&w, h, row_begin, row_end, width)) {
         drop(&w);
@@ -1324,6 +1532,8 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
         const size_t row = (size_t)j * (size_t)width;
         for (int i = 0; i < width; ++i)
             w.owner[i] = -1;
+        for (int i = 0; i < width; ++i)
+            w.margin[i] = INFINITY;
         const plane_row ground = plane_row_of(plane_y * unit, &h->plane);
         const int *active = w.active + w.start[j - row_begin];
         const int count = w.start[j - row_begin + 1] - w.start[j - row_begin];
@@ -1347,7 +1557,7 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
                 --span.last;
             if (scene->crosses_plane[k]) {
                 for (int i = span.first; i <= span.last; ++i)
-                    if (is_seen(&w, h, active, slot, w.owner[i], (i + left) * step, &ground)) {
+                    if (is_seen(&w, h, active, slot, w.owner[i], (i + left) * step, &ground, &w.margin[i])) {
                         left_over -= w.owner[i] < 0;
                         w.owner[i] = slot;
                     }
@@ -1363,7 +1573,7 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
         if (scene->plane_seen)
             for (int i = 0; i < width; ++i)
                 if (w.owner[i] < 0)
-                    w.owner[i] = ground_at((i + left) * step, &ground, h, count);
+                    w.owner[i] = ground_at((i + left) * step, &ground, h, count, &w.margin[i]);
 
         /* runs of pixels of one owner: shaded together with what follows, as many at a time as there is room for */
         points *p = w.points;
@@ -1374,6 +1584,9 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
             while (end < width && w.owner[end] == owner)
                 ++end;
             if (owner < 0) {
+                for (int q = i; q < end; ++q)
+                    if (unsettled && !(w.margin[q] > 0.0))
+                        unsettled[found++] = (ptrdiff_t)row + q;
                 for (int q = i; q < end; ++q) {
                     const double height = height_of(scene, (q + left) * step, plane_y * unit, -scene->eye * unit);
                     for (int c = 0; c < CHANNELS; ++c) {
@@ -1394,26 +1607,27 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
             const int receiver = owner < count ? active[owner] : scene->spheres + owner - count;
             for (int begin = i, some; begin < end; begin += some) {
                 if (p->count == POINTS)
-                    flush(p, h, out, layers, row);
+                    found += flush(p, h, out, layers, row, unsettled ? unsettled + found : NULL);
                 some = end - begin < POINTS - p->count ? end - begin : POINTS - p->count;
                 p->run[p->runs].place = begin;
-                surface(p, &w, h, owner, receiver, some, begin + left, step, &ground);
+                surface(p, &w, h, owner, receiver, some, begin + left, step, &ground, w.margin + begin);
                 if (layers)
                     write_geometry(p, &w, h, layers, row, owner, left, step, &ground);
             }
         }
         if (p->count > 0)
-            flush(p, h, out, layers, row);
+            found += flush(p, h, out, layers, row, unsettled ? unsettled + found : NULL);
     }
     drop(&w);
-    return 0;
+    return found;
 }
 
-int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(
-    double *values, const double *x, const double *y, ptrdiff_t count, const frame *h)
+ptrdiff_t scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(
+    double *values, const double *x, const double *y, ptrdiff_t count, const frame *h, ptrdiff_t *unsettled)
 {
     const scene_type *scene = h->scene;
     const double plane_unit = h->span.plane_unit;
+    ptrdiff_t found = 0;
     workspace w;
     if (!take_for_points(&w, h)) {
         drop(&w);
@@ -1424,6 +1638,7 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(
     for (ptrdiff_t i = 0; i < count; ++i) {
         const double unit = point_unit(plane_unit, x[i], y[i], 0x1p200);
         int owner = -1;
+        double sure = INFINITY;
         const plane_row ground = plane_row_of(y[i] * unit, &h->plane);
         /* two slots: what the point shows so far, and the sphere that is tried */
         int active[2] = {0, 0};
@@ -1432,7 +1647,7 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(
             enter_row(&w, h, 1, k, y[i] * unit);
             if (!hits(&w, h, 1, k, x[i], y[i], 1.0, unit))
                 continue;
-            if (!is_seen(&w, h, active, 1, owner, x[i] * unit, &ground))
+            if (!is_seen(&w, h, active, 1, owner, x[i] * unit, &ground, &sure))
                 continue;
             owner = 0;
             active[0] = k;
@@ -1441,10 +1656,12 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(
         }
         int receiver = owner < 0 ? -1 : active[0];
         if (owner < 0) {
-            const int material = scene->plane_seen ? ground_at(x[i] * unit, &ground, h, 0) : -1;
+            const int material = scene->plane_seen ? ground_at(x[i] * unit, &ground, h, 0, &sure) : -1;
             receiver = material < 0 ? -1 : scene->spheres + material;
         }
         if (receiver < 0) {
+            if (unsettled && !(sure > 0.0))
+                unsettled[found++] = i;
             const double height = height_of(scene, x[i] * unit, y[i] * unit, -scene->eye * unit);
             for (int c = 0; c < CHANNELS; ++c) {
                 const double value = backdrop(scene, height, c);
@@ -1453,14 +1670,14 @@ int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(
             continue;
         }
         if (p->count == POINTS || i - (out - values) / CHANNELS > 0x3fffffff) {
-            flush(p, h, out, NULL, 0);
+            found += flush(p, h, out, NULL, (size_t)((out - values) / CHANNELS), unsettled ? unsettled + found : NULL);
             out = values + CHANNELS * i;
         }
         p->run[p->runs].place = (int)(i - (out - values) / CHANNELS);
-        surface(p, &w, h, 0, receiver, 1, x[i] * unit, 1.0, &ground);
+        surface(p, &w, h, 0, receiver, 1, x[i] * unit, 1.0, &ground, &sure);
     }
     if (p->count > 0)
-        flush(p, h, out, NULL, 0);
+        found += flush(p, h, out, NULL, (size_t)((out - values) / CHANNELS), unsettled ? unsettled + found : NULL);
     drop(&w);
-    return 0;
+    return found;
 }

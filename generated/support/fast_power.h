@@ -48,16 +48,34 @@ SYMRENDER_INLINE float fast_exp2f(float y)
     return y < -126.0f ? 0.0f : two_to_y;
 }
 
-/* (cos a)^exponent from cos2 = cos^2 a and sin2 = sin^2 a, 0 <= a <= 90 degrees, as cos2^(exponent / 2); from 1 - sin2
- * where sin2 <= 5/16, so that a highlight of a large exponent keeps its shape. */
-SYMRENDER_INLINE float fast_power_of_cosinef(float cos2, float sin2, float exponent)
+/* log2 (cos a)^2 from cos2 = cos^2 a and sin2 = sin^2 a, 0 <= a <= 90 degrees; from 1 - sin2 where
+ * sin2 <= 5/16, so that a highlight of a large exponent keeps its shape. */
+SYMRENDER_INLINE float fast_log2_of_lobef(float cos2, float sin2)
 {
-    const float n = exponent < 0x1p100f ? exponent : 0x1p100f;   /* INFINITY times 0 is no number */
     const int is_near = sin2 <= 0.3125f;
     const power_partsf elsewhere = fast_splitf(cos2);
     const power_partsf parts = {is_near ? 0.0f : elsewhere.k, is_near ? -sin2 : elsewhere.f};
-    const float log2_power = 0.5f * (n * fast_log2_of_partsf(parts));
+    return fast_log2_of_partsf(parts);
+}
+
+/* The same where sin2 is 1 - cos2 and no more accurate: splitting cos2 gives 1 - sin2 then. */
+SYMRENDER_INLINE float fast_log2_of_squaref(float cos2)
+{
+    return fast_log2_of_partsf(fast_splitf(cos2));
+}
+
+/* (cos a)^exponent = 2^(exponent/2 log2_cos2) */
+SYMRENDER_INLINE float fast_power_of_lobef(float log2_cos2, float exponent)
+{
+    const float n = exponent < 0x1p100f ? exponent : 0x1p100f;   /* INFINITY times 0 is no number */
+    const float log2_power = 0.5f * (n * log2_cos2);
     return fast_exp2f(log2_power < 0.0f ? log2_power : 0.0f);   /* a sin2 below 0 by rounding is 0 */
+}
+
+/* (cos a)^exponent from both squares, as cos2^(exponent / 2) */
+SYMRENDER_INLINE float fast_power_of_cosinef(float cos2, float sin2, float exponent)
+{
+    return fast_power_of_lobef(fast_log2_of_lobef(cos2, sin2), exponent);
 }
 
 /* base^exponent for any base >= 0; INFINITY from 2^127 up. */

@@ -2,8 +2,9 @@
 
 In:  sources and declarations as text. Out: CachedKernel, and Library with functions to call.
 Never here: sympy, templates, numpy, or a process on a warm start. Silence neither: every failure shows its command.
-Beside these names: `symrender_cg.build.vectorisation` (which loops became vector code) and
-`symrender_cg.build.diagnosis` (what `doctor` prints), imported by those who ask.
+Beside these names, imported by those who ask: `portable` (the builds of one library for every processor of a kind),
+`vectorisation` (which loops became vector code), `reports` (the same for processors that are not here), `instructions`
+(the arithmetic of a loop, counted in its assembly) and `diagnosis` (what `doctor` prints).
 """
 
 from symrender_cg.build.cache import Cache, CacheSize, CacheWarning, default_root

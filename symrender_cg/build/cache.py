@@ -28,6 +28,7 @@ from pathlib import Path
 from symrender_cg.build import library
 from symrender_cg.build.compile import compile_library, kernel_flags, project_flags
 from symrender_cg.build.library import CachedKernel, Library, read_kernel
+from symrender_cg.build.portable import binding_text, fingerprint
 from symrender_cg.build.toolchain import RecordStore, Toolchain, cpu_identity, find_toolchain
 from symrender_cg.errors import ArgumentError, CompileError, CompilerNotFoundError, LibraryError
 
@@ -35,7 +36,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-FORMAT = 1
+FORMAT = 2
 ABANDONED_SECONDS = 3600.0  # a build that is still under a dotted name after an hour was killed
 PUBLISH_ATTEMPTS = 8
 
@@ -174,7 +175,7 @@ class Cache:
     def clear(self) -> CacheSize:
         """Remove every entry, nothing else under the root, and return what there was. Loaded libraries stay usable."""
         before = self.size()
-        for part in ("recipes", "kernels", "toolchains"):
+        for part in ("recipes", "kernels", "toolchains", "cost"):
             for path in _children(self.root / part):
                 _discard(path)
         self._records.forget()
@@ -294,7 +295,8 @@ def _identity(toolchain: Toolchain, portable: bool, extra_flags: Sequence[str]) 
     target = toolchain.target(portable)
     flags = kernel_flags(toolchain, portable, extra_flags)
     compiler = [toolchain.path, toolchain.kind, toolchain.version, toolchain.command]
-    return _digest([compiler, target.cpu, target.fingerprint, flags, library.cffi_version()])
+    builds = fingerprint(toolchain) if portable else ""
+    return _digest([compiler, target.cpu, target.fingerprint, flags, builds, library.cffi_version()])
 
 
 def _machine_identity(portable: bool, extra_flags: Sequence[str]) -> str:
@@ -332,8 +334,9 @@ def _build_under(root: Path, job: _Job, key: str) -> CachedKernel:
             toolchain=job.toolchain,
             portable=job.portable,
             extra_flags=job.extra_flags,
+            declarations=job.cdef,
         )
-        library.write_binding(job.cdef, folder)
+        library.write_binding(binding_text(job.cdef, job.toolchain, portable=job.portable), folder)
         (folder / library.CDEF_NAME).write_bytes(job.cdef.encode())
         manifest = library.write_manifest(
             folder,

@@ -1,16 +1,19 @@
 """C texts -> a shared library, by running the compiler ourselves in the folder of the sources.
 
-In:  sources by file name, a Toolchain, flags. Out: the library and a CompileRecord.
+In:  sources by file name, a Toolchain, flags. Out: the library and a CompileRecord. A portable library of declared
+functions is compiled once for each of its builds (`portable.py`) and linked from all of them.
 Never here: a cache, a fall-back, or a lost message: a failure is a CompileError with command, status and stderr.
 """
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from symrender_cg.build import portable as portable_library
 from symrender_cg.build.toolchain import Toolchain, run_compiler
 from symrender_cg.errors import ArgumentError, CompileError
 from symrender_cg.resources import template_path
@@ -22,7 +25,10 @@ FLAGS_FILE = "compile-flags.txt"
 
 @dataclass(frozen=True, slots=True)
 class CompileRecord:
-    """One run of the compiler: its command (file names relative to its folder), wall-clock seconds, and stderr."""
+    """What was run: its command (file names relative to its folder), wall-clock seconds, and stderr.
+
+    Of several commands it is the script that holds them all.
+    """
 
     command: tuple[str, ...]
     seconds: float
@@ -47,18 +53,60 @@ def compile_library(
     toolchain: Toolchain,
     portable: bool = False,
     extra_flags: Sequence[str] = (),
+    declarations: str = "",
 ) -> CompileRecord:
     """Write `sources` (file name -> text, headers included) beside `output` and compile the .c files among them.
 
+    A portable library with `declarations`, the C prototypes of its functions, carries a build for each level of
+    processor and picks one when it is loaded; without them it is one build, for the least.
     Raises CompileError where the compiler refuses or cannot be started, and leaves no partial library behind;
-    OSError where the folder cannot be written; ArgumentError for a file name that leaves the folder.
+    OSError where the folder cannot be written; ArgumentError for a file name that leaves the folder; LibraryError for
+    declarations that cannot be passed on.
     """
     folder = output.parent
     write_sources(sources, folder)
     units = c_files(sources)
+    builds = portable_library.builds_of(toolchain) if portable and declarations else ()
+    if builds:
+        return _compile_builds(units, output, toolchain, builds, extra_flags, declarations)
     flags = kernel_flags(toolchain, portable, extra_flags)
     command = (*toolchain.command, *flags, *SHARED_FLAGS, "-o", output.name, *units, *LINK_FLAGS)
     return run_checked(command, folder, output)
+
+
+def _compile_builds(
+    units: Sequence[str],
+    output: Path,
+    toolchain: Toolchain,
+    builds: Sequence[portable_library.Build],
+    extra_flags: Sequence[str],
+    declarations: str,
+) -> CompileRecord:
+    """Every unit for every build, the file that picks, and all of them linked; the commands are kept as a script."""
+    folder = output.parent
+    (folder / portable_library.PICKING_NAME).write_bytes(portable_library.picking_text(declarations).encode())
+    common = (*toolchain.command, *project_flags())
+    jobs = [(portable_library.PICKING_NAME, "picking.o", builds[0].flags)]
+    for build in builds:
+        own = (*build.flags, "-fvisibility=hidden", *portable_library.definitions(declarations, build))
+        jobs += [(unit, f"unit_{number}{build.suffix}.o", own) for number, unit in enumerate(units)]
+    objects = [made for _, made, _ in jobs]
+    commands = [(*common, *own, *extra_flags, "-fPIC", "-c", "-o", made, unit) for unit, made, own in jobs]
+    commands.append((*common, *SHARED_FLAGS, "-o", output.name, *objects, *LINK_FLAGS))
+    lines = (shlex.join(command) for command in commands)
+    (folder / portable_library.SCRIPT_NAME).write_text(
+        "set -e\n" + "\n".join(lines) + f"\nrm {shlex.join(objects)}\n", encoding="utf-8"
+    )
+    try:
+        records = [run_checked(command, folder) for command in commands]
+    except CompileError:
+        output.unlink(missing_ok=True)
+        raise
+    finally:
+        for made in objects:
+            (folder / made).unlink(missing_ok=True)
+    seconds = sum(record.seconds for record in records)
+    return CompileRecord(("sh", portable_library.SCRIPT_NAME), seconds, "".join(record.stderr for record in records))
 
 
 def run_checked(command: tuple[str, ...], folder: Path, output: Path | None = None) -> CompileRecord:

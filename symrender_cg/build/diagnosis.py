@@ -14,6 +14,7 @@ from pathlib import Path
 from symrender_cg.build import library, vectorisation
 from symrender_cg.build.cache import Cache, CacheSize
 from symrender_cg.build.compile import compile_library, kernel_flags
+from symrender_cg.build.portable import binding_text
 from symrender_cg.build.toolchain import REMEDIES, Target, Toolchain
 from symrender_cg.errors import CompileError, CompilerNotFoundError, ToolchainError
 
@@ -46,6 +47,7 @@ class Diagnosis:
 
     `trial_seconds` is the time of a small compilation that was loaded and called with the right result, None where
     that failed; `trial_vector_bytes` the vector width of its loop by the compiler's report, 0 where not vectorised.
+    `trial_processor` is the build of a portable trial that runs here, empty where there is one build alone.
     """
 
     python: str
@@ -57,6 +59,7 @@ class Diagnosis:
     flags: tuple[str, ...]
     trial_seconds: float | None
     trial_vector_bytes: int
+    trial_processor: str
     cache_root: Path
     cache_size: CacheSize
     cache_writable: bool
@@ -74,9 +77,10 @@ def diagnose(root: Path | str | None = None, *, portable: bool = False) -> Diagn
     toolchain: Toolchain | None = None
     seconds: float | None = None
     width = 0
+    processor = ""
     try:
         toolchain = cache.toolchain()
-        seconds = _trial(toolchain, portable)
+        seconds, processor = _trial(toolchain, portable)
         width = _trial_vector_bytes(toolchain, portable)
     except CompilerNotFoundError as problem:
         # the message ends with the remedies; here they have a field of their own
@@ -96,6 +100,7 @@ def diagnose(root: Path | str | None = None, *, portable: bool = False) -> Diagn
         flags=() if toolchain is None else kernel_flags(toolchain, portable),
         trial_seconds=seconds,
         trial_vector_bytes=width,
+        trial_processor=processor,
         cache_root=cache.root,
         cache_size=cache.size(),
         cache_writable=unwritable is None,
@@ -111,18 +116,31 @@ def _trial_vector_bytes(toolchain: Toolchain, portable: bool) -> int:
     return next((loop.bytes for loop in loops if loop.line == TRIAL_LOOP_LINE), 0)
 
 
-def _trial(toolchain: Toolchain, portable: bool) -> float:
-    """Seconds to compile a small kernel, which is then loaded and called. Raises ToolchainError."""
+def processor_here(toolchain: Toolchain) -> str:
+    """The last of a portable library's builds that this processor can run; empty where there is one build alone.
+
+    Raises ToolchainError.
+    """
+    return _trial(toolchain, portable=True)[1]
+
+
+def _trial(toolchain: Toolchain, portable: bool) -> tuple[float, str]:
+    """Seconds to compile a small kernel, which is then loaded and called, and the build that ran.
+
+    Raises ToolchainError.
+    """
     import tempfile
 
     with tempfile.TemporaryDirectory(prefix="symrender_cg-") as place:
         folder = Path(place)
-        record = compile_library(TRIAL_SOURCES, folder / library.LIBRARY_NAME, toolchain=toolchain, portable=portable)
-        library.write_binding(TRIAL_CDEF, folder)
+        output = folder / library.LIBRARY_NAME
+        told = TRIAL_CDEF if portable else ""
+        record = compile_library(TRIAL_SOURCES, output, toolchain=toolchain, portable=portable, declarations=told)
+        library.write_binding(binding_text(TRIAL_CDEF, toolchain, portable=portable), folder)
         opened = library.load(folder)
         squares = [float(i * i) for i in range(64)]
         roots = opened.ffi.new("double[]", len(squares))
         opened.lib.trial(opened.ffi.new("double[]", squares), roots, len(squares))
         if list(roots) != [i + 1.0 for i in range(64)]:
             raise ToolchainError(f"{toolchain.version} compiled a loop of sqrt wrongly: {list(roots)[:4]}...")
-        return record.seconds
+        return record.seconds, opened.processor

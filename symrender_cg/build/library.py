@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from symrender_cg.build.portable import PICKING_NAME, PROCESSOR_FUNCTION, SCRIPT_NAME, require_asked_processor
 from symrender_cg.errors import LibraryError
 
 TYPE_CHECKING = False
@@ -27,7 +28,7 @@ MANIFEST_NAME = "manifest.json"
 # Every library that was loaded, by path, inode and time of change.
 _opened: dict[tuple[str, int, int], Library] = {}
 
-RESERVED_NAMES = (LIBRARY_NAME, BINDING_NAME, CDEF_NAME, MANIFEST_NAME)
+RESERVED_NAMES = (LIBRARY_NAME, BINDING_NAME, CDEF_NAME, MANIFEST_NAME, PICKING_NAME, SCRIPT_NAME)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +97,13 @@ class Library:
     lib: Any
     ffi: Any
     path: Path
+
+    @property
+    def processor(self) -> str:
+        """The build that a portable library runs: x86-64, x86-64-v3 or x86-64-v4; empty for a library of one build."""
+        if PROCESSOR_FUNCTION not in dir(self.lib):
+            return ""
+        return str(self.ffi.string(getattr(self.lib, PROCESSOR_FUNCTION)()).decode())
 
     def __reduce__(self) -> tuple[object, tuple[Path]]:
         return load, (self.path.parent,)
@@ -179,7 +187,10 @@ def _open(binding: Path, path: Path) -> Library:
             getattr(lib, name)
         except (AttributeError, ffi.error) as problem:
             raise LibraryError(f"the library {path} lacks the entry point {name!r}: {problem}") from problem
-    return Library(lib, ffi, path)
+    opened = Library(lib, ffi, path)
+    if opened.processor:
+        require_asked_processor(opened.processor)
+    return opened
 
 
 def _ffi_of(path: Path) -> Any:

@@ -24,8 +24,10 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     import subprocess
 
-RECORD_FORMAT = 1
+RECORD_FORMAT = 2
 NAMES_ON_PATH = ("cc", "gcc", "clang")
+# The first major versions that know -march=x86-64-v3; Apple counts by itself.
+LEVELS_SINCE = {"gcc": 11, "clang": 12, "apple": 13, "zig": 12}
 LASTING_CPU_FACTS = frozenset(
     {"vendor_id", "cpu family", "model", "model name", "stepping", "flags"}  # x86
     | {"cpu implementer", "cpu architecture", "cpu variant", "cpu part", "cpu revision", "features"}  # ARM
@@ -55,7 +57,10 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Toolchain:
-    """A C compiler that answered: its path, kind ("gcc", "clang" or "zig"), version line and command prefix."""
+    """A C compiler that answered: its path, kind ("gcc", "clang" or "zig"), version line and command prefix.
+
+    `knows_levels`: it compiles for x86-64 and knows its levels x86-64-v3 and x86-64-v4, and CC names no processor.
+    """
 
     path: str
     kind: str
@@ -63,6 +68,7 @@ class Toolchain:
     command: tuple[str, ...]
     native: Target
     portable: Target
+    knows_levels: bool
 
     def target(self, portable: bool) -> Target:
         """The machine's own target, or the one that every machine of this architecture can run."""
@@ -79,7 +85,8 @@ class Toolchain:
             read = json.loads(text)
             native, portable = ({**read[name], "flags": tuple(read[name]["flags"])} for name in ("native", "portable"))
             resolved = {"native": Target(**native), "portable": Target(**portable)}
-            return Toolchain(**{**read, **resolved, "command": tuple(read["command"])})
+            said = {"command": tuple(read["command"]), "knows_levels": bool(read["knows_levels"])}
+            return Toolchain(**{**read, **resolved, **said})
         except (ValueError, KeyError, TypeError):
             return None
 
@@ -237,13 +244,20 @@ def _asked(candidate: _Candidate) -> Toolchain:
         portable_choices = (("-mcpu=baseline",), ())
     if chosen_by_user:
         native_choices = portable_choices = ((),)
-    native, kind, version = _probe(candidate, native_choices)
-    portable, _, _ = _probe(candidate, portable_choices)
-    return Toolchain(candidate.path, kind, version, candidate.command, native, portable)
+    native, kind, version, _ = _probe(candidate, native_choices)
+    portable, _, _, macros = _probe(candidate, portable_choices)
+    levels = not chosen_by_user and _knows_levels(kind, macros)
+    return Toolchain(candidate.path, kind, version, candidate.command, native, portable, levels)
 
 
-def _probe(candidate: _Candidate, choices: Sequence[tuple[str, ...]]) -> tuple[Target, str, str]:
-    """(target, kind, version line) under the first of several flag choices that the compiler accepts."""
+def _knows_levels(kind: str, macros: dict[str, str]) -> bool:
+    version = macros.get("__GNUC__" if kind == "gcc" else "__clang_major__", "0")
+    family = "apple" if "__apple_build_version__" in macros else kind
+    return "__x86_64__" in macros and version.isdigit() and int(version) >= LEVELS_SINCE.get(family, 1 << 30)
+
+
+def _probe(candidate: _Candidate, choices: Sequence[tuple[str, ...]]) -> tuple[Target, str, str, dict[str, str]]:
+    """(target, kind, version line, predefined macros) under the first of several flag choices that are accepted."""
     for flags in choices:
         command = (*candidate.command, *flags, "-v", "-dM", "-E", "-x", "c", os.devnull)
         try:
@@ -253,7 +267,7 @@ def _probe(candidate: _Candidate, choices: Sequence[tuple[str, ...]]) -> tuple[T
         macros = dict(line.split(" ", 2)[1:3] for line in answer.stdout.splitlines() if line.count(" ") >= 2)
         if answer.returncode == 0 and "__STDC__" in macros:
             kind = "zig" if candidate.is_zig else "clang" if "__clang__" in macros else "gcc"
-            return _target(flags, macros, answer.stderr), kind, _version_line(macros, answer.stderr)
+            return _target(flags, macros, answer.stderr), kind, _version_line(macros, answer.stderr), macros
     said = answer.stderr.strip().splitlines()
     telling = [line for line in said if "error" in line] or said[-1:] or ["nothing"]
     raise _ProbeError(f"exit status {answer.returncode}, it said: {telling[0]}")

@@ -21,6 +21,7 @@ from symrender_cg.build.cache import Cache
 from symrender_cg.build.library import CachedKernel
 from symrender_cg.cli.console import counted, duration, listed
 from symrender_cg.cli.levels import accuracies_for
+from symrender_cg.cli.requests import choose_for
 from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import variant
 from symrender_cg.plan.plan import Plan, plan
@@ -53,7 +54,7 @@ class Order:
     @property
     def kernel(self) -> str:
         """What tells the kernels of one scene apart."""
-        return pipeline.ENCLOSURE if self.encloses else variant(self.accuracy, self.target).name
+        return pipeline.ENCLOSURE if self.encloses else variant(self.accuracy, self.target).key
 
     @property
     def numbers(self) -> dict[str, float] | None:
@@ -89,6 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
     begin = time.perf_counter()
     scene = load_scene(arguments.scene)
     scene_plan = plan(scene)
+    choose_for(arguments, scene, flags=False)
     accuracies = accuracies_for(scene, arguments.accuracy, bake=arguments.bake)
     folder = Path(arguments.out)
     orders = _orders(arguments, scene, scene_plan, accuracies)
@@ -146,7 +148,8 @@ def _orders(arguments: argparse.Namespace, scene: Scene, found: Plan, accuracies
 
 def _recall(store: Cache, order: Order) -> Built | None:
     """The kernel as it was built before, its texts read from the cache and checked; None where anything is missing."""
-    found = store.recall(order.text_recipe, portable=order.portable)
+    flags = variant(order.accuracy, order.target).flags
+    found = store.recall(order.text_recipe, portable=order.portable, extra_flags=flags)
     if found is None:
         return None
     cached, payload = found

@@ -1,4 +1,7 @@
-"""`doctor`: what this machine has and lacks, for people or as JSON; `--clear-cache` empties the cache instead."""
+"""`doctor`: what this machine has and lacks, for people or as JSON.
+
+`--clear-cache` empties the cache instead, `--vectors` says what compilers make of a kernel's loops (`vectors.py`).
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from typing import Any
 
 from symrender_cg.build.cache import Cache
 from symrender_cg.build.diagnosis import Diagnosis, Problem, diagnose
+from symrender_cg.build.reports import function_at
 from symrender_cg.build.toolchain import Toolchain
 from symrender_cg.cli.console import counted, duration, size
 from symrender_cg.errors import CompileError, ToolchainError
@@ -44,6 +48,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Prints the diagnosis; 0 where kernels can be built, 5 where not."""
     if arguments.clear_cache:
         return _clear(as_json=arguments.json)
+    if arguments.vectors is not None:
+        from symrender_cg.cli import vectors
+
+        return vectors.run(arguments.vectors, as_json=arguments.json)
     found = diagnose(portable=arguments.portable)
     usable = found.trial_seconds is not None
     loops: tuple[Loop, ...] = ()
@@ -84,7 +92,7 @@ def kernel_loops(toolchain: Toolchain, *, portable: bool) -> tuple[Loop, ...]:
         lines = emitted.files[own].splitlines()
         found = vectorisation.report(emitted.files, toolchain=toolchain, portable=portable)
         loops += [
-            Loop(emitted.name, _function_at(lines, loop.line), loop.line, loop.bytes)
+            Loop(emitted.name, function_at(lines, loop.line), loop.line, loop.bytes)
             for loop in found
             if loop.file.endswith(own)
         ]
@@ -101,14 +109,6 @@ def as_data(found: Diagnosis, loops: tuple[Loop, ...], problems: list[Problem]) 
     return data
 
 
-def _function_at(lines: list[str], line: int) -> str:
-    """The name of the C function that a line (1-based) stands in: the last definition that starts before it."""
-    for text in reversed(lines[:line]):
-        if text and text[0].isalpha() and "(" in text and not text.startswith("typedef"):
-            return text.split("(")[0].split()[-1].lstrip("*")
-    return ""
-
-
 def _print(found: Diagnosis, loops: tuple[Loop, ...], problems: list[Problem]) -> None:
     rows = [("python", f"{found.python} on {found.system}, cffi {found.cffi}")]
     if found.toolchain is not None and found.target is not None:
@@ -123,6 +123,8 @@ def _print(found: Diagnosis, loops: tuple[Loop, ...], problems: list[Problem]) -
         rows.append(("CC", found.cc_setting))
     if found.trial_seconds is not None:
         width = f"{found.trial_vector_bytes} byte vectors" if found.trial_vector_bytes else "not vectorised"
+        if found.trial_processor:
+            width += f" at least; of a portable library the build for {found.trial_processor} runs here"
         rows.append(("trial", f"compiled, loaded and called in {duration(found.trial_seconds)}, {width}"))
     rows += [("loops", _summary(kernel, loops)) for kernel in dict.fromkeys(loop.kernel for loop in loops)]
     held = found.cache_size

@@ -5,14 +5,18 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from symrender_cg.cli import explain_scene, explain_sphere
 from symrender_cg.cli.derivation import finding_data, print_findings
 from symrender_cg.cli.proof import print_proof
+from symrender_cg.cli.requests import choice_data, show_choice
 from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import variant
 from symrender_cg.scene import Scene, load_scene
+
+if TYPE_CHECKING:
+    from symrender_cg.cost.choose import Choice
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -20,6 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     scene = load_scene(arguments.scene)
     if arguments.latex and (arguments.ablate or arguments.findings):
         raise ArgumentError("--latex: findings and ablations are printed as text or as --json; leave --latex out")
+    choice = _choice(scene, arguments)
     chosen = variant(arguments.accuracy, arguments.target)
     if arguments.ablate and chosen.settles:
         raise ArgumentError(
@@ -44,12 +49,31 @@ def run(arguments: argparse.Namespace) -> int:
     proof = proof_of(scene, arguments.accuracy, arguments.target, width=width, height=height)
     if arguments.json:
         data = explain_sphere.as_data(found) if isinstance(found, Explanation) else explain_scene.as_data(found)
-        _out(data | {"proof": None if proof is None else asdict(proof)})
+        _out(data | {"proof": None if proof is None else asdict(proof)} | _choice_data(choice))
         return 0
+    if choice is not None:
+        show_choice(choice)
+        print()
     explain_sphere.show(found) if isinstance(found, Explanation) else explain_scene.show(found)
     if proof is not None:
         print_proof(proof)
     return 0
+
+
+def _choice(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
+    """What --meets chooses, put in the place of --accuracy and --target; None without it."""
+    if arguments.meets is None:
+        return None
+    from symrender_cg.cost.choose import choose
+
+    name, value = arguments.meets
+    found = choose(scene, **{name: value})
+    arguments.accuracy, arguments.target = found.accuracy, found.target
+    return found
+
+
+def _choice_data(choice: Choice | None) -> dict[str, Any]:
+    return {} if choice is None else {"choice": choice_data(choice)}
 
 
 def _ablate(scene: Scene, arguments: argparse.Namespace) -> int:

@@ -31,6 +31,7 @@ examples:
   python -m symrender_cg check                          the kernels against numpy and the oracle
   python -m symrender_cg stress                         accuracy levels on hard cases
   python -m symrender_cg conditioning -o moved.png      how much half an ulp of the inputs moves each pixel
+  python -m symrender_cg cost                           what accuracy costs in time, measured
   python -m symrender_cg doctor                         what this machine has and lacks
 """
 
@@ -49,6 +50,7 @@ examples:
   python -m symrender_cg build scene.toml --accuracy double --passes
   python -m symrender_cg build --accuracy double --bake     the scene's numbers folded into the C
   python -m symrender_cg build --accuracy certified --target uint8
+  python -m symrender_cg build --max-error 1e-6             the C of the fastest variant that meets it
   python -m symrender_cg build mirrors                      the kernels of a scene of many spheres
 """
 
@@ -149,6 +151,23 @@ examples:
   python -m symrender_cg conditioning far_small --json
 """
 
+_COST = """\
+Measures what accuracy costs in time: every level, choices beside the levels that a search finds, kernels with the
+scene's numbers baked in, plans that leave out more or less, numpy, sympy's lambdify, four rays a pixel. Times are
+interleaved in one run on one thread; errors are those of the unclipped field against the oracle, at points that the
+search did not use. Printed are the front (nothing is both faster and more accurate), what each step along it buys, what
+dominates the rest, and when a special kernel has paid for its build. Kept by scene and machine.
+
+--max-error, --max-ulp, --bits   which variant render_image would draw with, and what it was chosen from; exit code 4
+                                 where none meets it"""
+_COST_EXAMPLES = """\
+examples:
+  python -m symrender_cg cost
+  python -m symrender_cg cost mirrors --plot cost.png --html cost.html
+  python -m symrender_cg cost hundred --quick --effects
+  python -m symrender_cg cost --max-error 1e-6
+"""
+
 _DOCTOR = """\
 Says what this machine has: compiler, flags and target as resolved, the vector width in the kernels' inner loops (from
 the compiler's own report), the cache, Python packages; and how to get what is missing. Exit code 5 without a compiler
@@ -156,6 +175,7 @@ that works."""
 _DOCTOR_EXAMPLES = """\
 examples:
   python -m symrender_cg doctor
+  python -m symrender_cg doctor --vectors generated/centred_sphere_double/centred_sphere_double.c
   python -m symrender_cg doctor --clear-cache
 """
 
@@ -188,6 +208,7 @@ def build_parser() -> Parser:
     _add_check(commands)
     _add_stress(commands)
     _add_conditioning(commands)
+    _add_cost(commands)
     _add_doctor(commands)
     return parser
 
@@ -216,6 +237,7 @@ def _add_build(commands: argparse._SubParsersAction[Parser]) -> None:
     parser.add_argument(
         "--passes", action="store_true", help="derive anew, and show every pass (or part) of the lowering"
     )
+    _request(parser)
 
 
 def _add_render(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -240,6 +262,7 @@ def _add_render(commands: argparse._SubParsersAction[Parser]) -> None:
     parser.add_argument(
         "--backend", choices=("native", "numpy"), default="native", help="numpy needs no compiler and is slower"
     )
+    _request(parser, bits=False)
     parser.add_argument("--list", action="store_true", help="list the built-in scenes and exit")
 
 
@@ -256,6 +279,12 @@ def _add_explain(commands: argparse._SubParsersAction[Parser]) -> None:
     what.add_argument("--ablate", action="store_true", help="measure what each effect costs and changes")
     parser.add_argument(
         "--max-error", type=tolerance, default=0.0, metavar="E", help="how much any pixel may change (default: 0)"
+    )
+    parser.add_argument(
+        "--meets",
+        type=request,
+        metavar="R=V",
+        help="max_error=1e-6, max_ulp=4 or bits=8: the variant that meets it on this machine, in place of --accuracy",
     )
     _size(parser, (256, 256))
 
@@ -297,11 +326,47 @@ def _add_conditioning(commands: argparse._SubParsersAction[Parser]) -> None:
     parser.add_argument("--json", action="store_true", help="the figures as one JSON object")
 
 
+def _add_cost(commands: argparse._SubParsersAction[Parser]) -> None:
+    parser = _command(commands, "cost", "what accuracy costs in time", _COST, _COST_EXAMPLES)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
+    _size(parser, (256, 256))
+    parser.add_argument(
+        "--rounds", type=_count_from_one, metavar="N", help="interleaved rounds (default: 15; quick: 7)"
+    )
+    parser.add_argument("--seed", type=_count, default=1, metavar="N", help="of points and rounds (default: 1)")
+    parser.add_argument("--quick", action="store_true", help="no search, fewer rounds and points")
+    parser.add_argument("--again", action="store_true", help="measure anew what was measured before")
+    parser.add_argument("--all", action="store_true", help="every choice that was tried, also where it is dominated")
+    parser.add_argument("--effects", action="store_true", help="the scene's time with one effect after the other")
+    parser.add_argument("--plot", metavar="FILE", help="the chart: .png, .svg or .pdf (needs matplotlib)")
+    parser.add_argument("--html", metavar="FILE", help="everything in one .html: chart, images, histograms, the C")
+    parser.add_argument("--json", action="store_true", help="the report as one JSON object")
+    _request(parser)
+    parser.add_argument("--proved", action="store_true", help="of a request: by a proved bound alone")
+
+
+def _request(parser: Parser, *, bits: bool = True) -> None:
+    """What a variant may be asked for in place of an accuracy."""
+    asked = parser.add_mutually_exclusive_group()
+    asked.add_argument("--max-error", type=_positive, metavar="E", help="the fastest variant with errors up to E")
+    asked.add_argument("--max-ulp", type=_positive, metavar="U", help="the fastest within U units in the last place")
+    if bits:
+        asked.add_argument("--bits", type=_positive, metavar="B", help="the fastest within half a step of B bits")
+
+
 def _add_doctor(commands: argparse._SubParsersAction[Parser]) -> None:
     parser = _command(commands, "doctor", "compiler, target, vector width, cache", _DOCTOR, _DOCTOR_EXAMPLES)
     _portable(parser)
     parser.add_argument("--json", action="store_true", help="everything as one JSON object")
     parser.add_argument("--clear-cache", action="store_true", help="remove every cached kernel, say what, and exit")
+    parser.add_argument(
+        "--vectors",
+        nargs="?",
+        const="double",
+        metavar="KERNEL",
+        help="what gcc and clang make of each loop of a kernel, for each processor they can compile for: a level of "
+        "Chapter 1's scene (default: double), a scene, or a kernel's .c file",
+    )
 
 
 def _size(parser: Parser, default: tuple[int, int]) -> None:
@@ -314,10 +379,27 @@ def _size(parser: Parser, default: tuple[int, int]) -> None:
     )
 
 
+class _Accuracies(tuple[str, ...]):
+    """The levels as argparse lists them; a level with choices that `cost` found, such as `single_fused`, is one too."""
+
+    __slots__ = ()
+
+    def __contains__(self, name: object) -> bool:
+        return tuple.__contains__(self, name) or (isinstance(name, str) and _is_choice(name))
+
+
+def _is_choice(name: str) -> bool:
+    if "_" not in name:
+        return False
+    from symrender_cg.lower.choices import named
+
+    return named(name) is not None
+
+
 def _accuracy(parser: Parser) -> None:
     parser.add_argument(
         "--accuracy",
-        choices=ACCURACIES,
+        choices=_Accuracies(ACCURACIES),
         default="double",
         metavar="A",
         help=f"{', '.join(ACCURACIES)} (default: double)",
@@ -362,11 +444,12 @@ def image_size(text: str) -> tuple[int, int]:
 def accuracy_list(text: str) -> tuple[str, ...] | str:
     """`double,literal` -> those accuracies in the order of the package, each once; `all` -> `all`."""
     names = [name.strip() for name in text.split(",")]
-    if unknown := [name for name in names if name not in (*ACCURACIES, "all")]:
+    if unknown := [name for name in names if name not in (*ACCURACIES, "all") and not _is_choice(name)]:
         raise argparse.ArgumentTypeError(
             f"{unknown[0]!r} is not known; expected some of {', '.join(ACCURACIES)}, or all"
         )
-    return "all" if "all" in names else tuple(name for name in ACCURACIES if name in names)
+    levels = tuple(name for name in ACCURACIES if name in names)
+    return "all" if "all" in names else levels + tuple(dict.fromkeys(name for name in names if name not in ACCURACIES))
 
 
 def layer_list(text: str) -> tuple[str, ...]:
@@ -387,6 +470,20 @@ def tolerance(text: str) -> float:
     if 0.0 <= value < float("inf"):
         return value
     raise argparse.ArgumentTypeError(f"{text!r} is not a tolerance; expected a number >= 0, such as 0.002")
+
+
+def request(text: str) -> tuple[str, float]:
+    """`max_error=1e-6` -> ("max_error", 1e-6). Raises ArgumentTypeError for anything else."""
+    name, _, value = text.partition("=")
+    if name not in ("max_error", "max_ulp", "bits"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a request; expected max_error=E, max_ulp=U or bits=B")
+    return name, _positive(value)
+
+
+def _positive(text: str) -> float:
+    if (value := tolerance(text)) > 0.0:
+        return value
+    raise argparse.ArgumentTypeError(f"{text!r} is not a bound; expected a number above 0, such as 1e-6")
 
 
 def _count_from_one(text: str) -> int:

@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 from symrender_cg.cli.console import Column, Table, duration
 from symrender_cg.cli.layers import chosen_layers, write_layers
 from symrender_cg.cli.progress import Progress
+from symrender_cg.cli.requests import choose_for
 from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.output import SUFFIXES, ImageFormat, image_format, write_image
 from symrender_cg.pipeline import draw, enclosure_name, pixel_size, planned, statistics
 from symrender_cg.run.certify import Certified, Job, settle_image
 from symrender_cg.run.levels import job_of
-from symrender_cg.run.render import evaluate, render_layers, shape_of
+from symrender_cg.run.ready import shape_of
+from symrender_cg.run.render import evaluate, render_layers
 from symrender_cg.run.threads import over_rows, thread_count
 from symrender_cg.scene import Scene, load_scene
 
@@ -39,6 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
             f"-o FILE is missing: where should the image go? expected a file's name that ends in {_suffixes()}"
         )
     target = Path(arguments.output)
+    if arguments.max_error is not None or arguments.max_ulp is not None:
+        choose_for(arguments, load_scene(arguments.scene), names=("max_error", "max_ulp"))
     chosen = variant(arguments.accuracy, arguments.target)
     grey_levels = chosen.result == "uint8"
     form = image_format(target, bits=arguments.bits, encoding=arguments.encoding, levels=grey_levels)

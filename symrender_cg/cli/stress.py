@@ -62,7 +62,7 @@ def _of_scene(arguments: argparse.Namespace, levels: tuple[str, ...]) -> Report:
     levels = tuple(level for level in levels if level.partition(":")[0] in possible)
     with Progress(len(sets) * len(levels) * arguments.count, "hard points", "points") as progress:
         return run_scene(
-            ((entry.name, entry.jumps, frame, entry.points) for entry in sets),
+            ((entry.name, frame, entry.points) for entry in sets),
             levels,
             seed=arguments.seed,
             done=progress.done,

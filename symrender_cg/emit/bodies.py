@@ -55,6 +55,7 @@ class Bodies:
         carried = "" if baked else "f->"
         frame_places = dict.fromkeys((*program.inputs, *(s.name for s in program.at("frame"))), carried)
         self.row = body(row, frame_places)
+        self.frame_places = frame_places
         self.pixel_places = frame_places | {s.name: "r->" for s in row} | {"y": "r->"}
         self.pixel = body(pixel, self.pixel_places)
         self.sight = body(closure(pixel, ("d_dot_d", *program.hit)), self.pixel_places)

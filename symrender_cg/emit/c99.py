@@ -7,7 +7,7 @@ points, comments) is in templates/kernel.c.j2 and kernel.h.j2, which contain no 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import jinja2
@@ -16,6 +16,7 @@ from symrender_cg.derive.exact import SignTest
 from symrender_cg.derive.symbols import INPUTS
 from symrender_cg.emit.bodies import Bodies, counts, operations
 from symrender_cg.emit.settling import settling
+from symrender_cg.emit.stages import stages_of
 from symrender_cg.lower.nodes import Call, walk
 from symrender_cg.lower.program import RATES, KernelProgram
 from symrender_cg.lower.variants import Variant
@@ -28,8 +29,12 @@ SUPPORT = {
     "span.h": None,
     "units.h": ("unit_exponent", "light_exponent", "point_unit"),
     "square.h": ("square",),
+    "block.h": None,
     "phong_power.h": ("power", "powerf", "power_of_cosine", "power_of_cosinef"),
-    "fast_power.h": ("fast_powerf", "fast_power_of_cosinef"),
+    "lobe_power.h": ("log2_of_lobe", "log2_of_lobef"),
+    "fast_power.h": ("fast_powerf", "fast_power_of_cosinef", "fast_log2_of_lobef", "fast_log2_of_squaref"),
+    "coarse_power.h": ("coarse_powerf", "coarse_power_of_cosinef"),
+    "libm_power.h": ("libm_power", "libm_powerf", "libm_power_of_cosine", "libm_power_of_cosinef"),
     "double_double.h": ("dd_",),
     "pair.h": ("pair_",),
     "precise_power.h": ("precise_power_of_cosine",),
@@ -39,7 +44,13 @@ SUPPORT = {
 }
 """Support headers and the functions that call for them, in the order in which they are included."""
 
-CARRIED = {"phong_power.h": ("power.h",), "fast_power.h": ("power.h",), "precise_power.h": ("power.h",)}
+CARRIED = {
+    "phong_power.h": ("power.h",),
+    "fast_power.h": ("power.h",),
+    "coarse_power.h": ("fast_power.h", "power.h"),
+    "lobe_power.h": ("power.h",),
+    "precise_power.h": ("power.h",),
+}
 """Headers that a support header includes itself."""
 
 
@@ -47,7 +58,8 @@ CARRIED = {"phong_power.h": ("power.h",), "fast_power.h": ("power.h",), "precise
 class Emitted:
     """The text of a kernel. `files` maps file names to text (the kernel's own two first); `cdef` is what cffi reads.
 
-    `fields` are names and shapes of a scene kernel's structure, see symrender_cg.emit.scene_fields.
+    `fields` are names and shapes of a scene kernel's structure, see symrender_cg.emit.scene_fields. `mirrored` are
+    those of a pixel's operations that the pixels at x and -x share.
     """
 
     name: str
@@ -57,6 +69,7 @@ class Emitted:
     result_type: str
     operations: dict[str, dict[str, int]]
     fields: tuple[tuple[str, str], ...] = ()
+    mirrored: Mapping[str, int] = field(default_factory=dict)
 
 
 def emit(
@@ -78,11 +91,13 @@ def emit(
         return repr(float(numbers[factor])) if numbers is not None else f"scene->{factor}"
 
     writer = Bodies(program, baked=numbers is not None)
+    shared = tuple(program[entry] for stage in program.stages[: program.mirrored] for entry in stage)
     uses = {node.function for step in program.steps for node in walk(step.value) if isinstance(node, Call)}
     formats = {step.format for step in program.steps}
     always = {"inline.h"}
     always |= {"exact_sign.h"} if variant.exact and (program.ends or not variant.settles) else set()
     always |= {"span.h"} if program.ends else set()
+    always |= {"block.h"} if program.stages else set()
     always |= {"units.h"} if variant.exact and not program.ends else set()
     always |= {"double_double.h"} if "double_double" in formats else set()
     always |= {"pair.h"} if "pair" in formats else set()
@@ -107,6 +122,9 @@ def emit(
         "sign_tests": [printed_test(test, place) for test in sign_tests],
         "result": program.result,
         "tests_front": len(program.hit) > 1,
+        "sight": program.hit,
+        "shared_counts": counts(shared) if shared else "",
+        "stages": stages_of(program, writer.frame_places, writer.pixel_places),
         "writer": writer,
     }
     if variant.settles:
@@ -124,6 +142,7 @@ def emit(
         inputs=tuple(entry.removeprefix("scene_") for entry in program.inputs),
         result_type=str(context["real"]),
         operations={rate: dict(operations(program.at(rate))) for rate in RATES if rate != "sphere"},
+        mirrored=dict(operations(shared)),
     )
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from symrender_cg.derive import parts
 from symrender_cg.derive.exact import sign_tests
 from symrender_cg.derive.image import derive_sphere
+from symrender_cg.derive.margins import gate_part, with_margin
 from symrender_cg.derive.parts import Part
 from symrender_cg.emit.bodies import INDENT, body, closure, counts, operations
 from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test, support_files
@@ -19,9 +20,12 @@ from symrender_cg.emit.parts import PrimaryBodies
 from symrender_cg.emit.scene_fields import Needs, field_lines, scene_fields
 from symrender_cg.lower.nodes import Call, walk
 from symrender_cg.lower.program import RATES, KernelProgram
-from symrender_cg.lower.variants import Variant
+from symrender_cg.lower.variants import MOST_ROUNDOFFS, Variant
 from symrender_cg.plan.plan import Plan
 from symrender_cg.version import VERSION
+
+_OF_THE_PLANE = {"blur": "blurred", "drift": "drifted"}
+"""What the plane gives points that it shows; of spheres both are 1."""
 
 _LOOP = 2 * INDENT
 _DEEP = 3 * INDENT
@@ -53,8 +57,8 @@ class Primary:
     void_outline: str
 
 
-def scene_parts(need: Needs) -> dict[str, Part]:
-    """The parts of the derivation that a scene's kernel is made of."""
+def scene_parts(need: Needs, *, marks: bool = False) -> dict[str, Part]:
+    """The parts of the derivation that a scene's kernel is made of; `marks`: with the margins of what they decide."""
     bent = need.specular or need.mirrors
     found: list[Part] = []
     if need.spans:
@@ -69,6 +73,8 @@ def scene_parts(need: Needs) -> dict[str, Part]:
         found += [parts.lamp_part(), parts.reach_part("p"), parts.shading_part(glossy=False)]
     if need.specular:
         found.append(parts.shading_part(glossy=True))
+    if need.specular_gate and marks:
+        found.append(gate_part())
     if need.attenuation:
         found.append(parts.fading_part())
     if need.shadows:
@@ -79,7 +85,17 @@ def scene_parts(need: Needs) -> dict[str, Part]:
             found.append(parts.echo_plane_part("p"))
     if need.gradient:
         found.append(parts.gradient_part())
-    return {part.name: part for part in found}
+    return {part.name: with_margin(part, blurred=_blurred(need)) if marks else part for part in found}
+
+
+def marks_doubt(variant: Variant) -> bool:
+    """Whether the kernel of a level lists the pixels that rounding may have decided, for somebody else to settle."""
+    return variant.shading == "float64" and variant.exact
+
+
+def _blurred(need: Needs) -> bool:
+    """Whether rounding moves some points more than others: on the plane, and beyond a mirror."""
+    return need.plane or need.mirrors
 
 
 def emit_scene(
@@ -94,11 +110,14 @@ def emit_scene(
     """C99 text of a scene's kernel. `command` is the line that regenerates it."""
     single = variant.shading == "float32"
     real = "float" if single else "double"
-    stored = _stored(need)
+    marks, stored = marks_doubt(variant), _stored(need)
+    if marks:
+        stored += ("blur",) if _blurred(need) else ()
+        stored += ("drift",) if need.mirrors else ()
     primaries = [_primary(programs[key], need, stored) for key in ("span", "near", "plane") if key in programs]
     fields = scene_fields(need)
     lines = field_lines(fields)
-    writer = _Loops(programs, need)
+    writer = _Loops(programs, need, marks)
     includes = _includes(programs, need)
     held = [f"{part.name}s" for part in primaries if part.bodies.has_sphere]
     held += ["row_first", "row_last"] if need.spheres else []
@@ -112,7 +131,12 @@ def emit_scene(
         *(["!scene->at_eye[k]"] if need.at_eye else []),
         *(["scene->partners_begin[k + 1] == scene->partners_begin[k]"] if need.intersections else []),
     ]
+    contested = need.spheres and (need.intersections or need.crossing)
     context = {
+        "marks": marks,
+        "row_marks": marks and (contested or need.plane),
+        "blurred": _blurred(need),
+        "most_roundoffs": MOST_ROUNDOFFS,
         "name": name,
         "version": VERSION,
         "command": command,
@@ -133,7 +157,7 @@ def emit_scene(
         "seen": need.spheres or need.plane,
         "spans": need.spans,
         "near": need.at_eye,
-        "contested": need.spheres and (need.intersections or need.crossing),
+        "contested": contested,
         "contest": " || ".join(contest),
         "left_test": " && ".join(spared),
         "mirrored_spheres": need.mirrors,
@@ -216,7 +240,8 @@ def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
 
 def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Primary:
     kind = program.name
-    bodies = PrimaryBodies(program, stored, parts.OUTLINE if kind == "span" else ())
+    wanted = [_OF_THE_PLANE.get(name, name) for name in stored]
+    bodies = PrimaryBodies(program, wanted, parts.OUTLINE if kind == "span" else ())
     given = [("ball", f"const {kind}_sphere *ball")] if bodies.has_sphere else []
     given.append(("f", f"const {kind}_frame *f"))
     names = [name for name, _ in given]
@@ -248,6 +273,10 @@ def _targets(bodies: PrimaryBodies, stored: Sequence[str]) -> list[tuple[str, st
     pairs = []
     for name in stored:
         source = name.replace("p_", "n_") if name.startswith("p_") and bodies.has_sphere else name
+        if name in _OF_THE_PLANE:
+            if bodies.has_sphere:
+                continue
+            source = _OF_THE_PLANE[name]
         pairs.append((name, source))
     return pairs
 
@@ -313,9 +342,11 @@ def tidied(text: str) -> str:
 class _Loops:
     """The bodies of the loops over points that wait in arrays."""
 
-    def __init__(self, programs: Mapping[str, KernelProgram], need: Needs) -> None:
+    def __init__(self, programs: Mapping[str, KernelProgram], need: Needs, marks: bool) -> None:
         self.programs = programs
         self.need = need
+        self.marks = marks
+        self.parts = scene_parts(need, marks=marks)
         self.point = "p" if need.plane else "n"
 
     def context(self) -> dict[str, object]:
@@ -331,6 +362,8 @@ class _Loops:
             found["lamp_lines"] = body(self.programs["lamp"].steps, lamp, _LOOP)
         if need.specular:
             found |= self._loop("glossy", "glossy")
+        if need.specular_gate and self.marks:
+            found |= self._loop("gate", "gate", indent=_DEEP, head=_LOOP)
         if need.attenuation:
             found |= self._loop("fading", "fading")
         if need.shadows:
@@ -341,17 +374,21 @@ class _Loops:
             found["gradient_lines"] = body(self.programs["gradient"].steps, {})
         if need.plane:
             plane = PrimaryBodies(self.programs["plane"], ())
-            ground = plane.pixel(("descent", *(("p_x", "p_y", "p_z") if need.checker else ())))
+            told = ("margin", *(("blurred",) if need.checker else ())) if self.marks else ()
+            ground = plane.pixel(("descent", *(("p_x", "p_y", "p_z") if need.checker else ()), *told))
             found |= {"ground_lines": ground, "void_ground": _void(ground, ["r", "f"])}
         if need.mirrors:
-            found |= self._loop("echo", "echo", ("disc", "ahead", "t"))
+            margin = ("margin",) if self.marks else ()
+            found |= self._loop("echo", "echo", ("disc", "ahead", "t", *margin))
             found |= self._loop("arrival", "arrival")
             found["arrival_stores"] = self._stores(("n", "n"), ("mirror", "next"), own="n")
             if need.plane:
-                first = ("descent", "t", *(("foot_x", "foot_y", "foot_z") if need.checker else ()))
+                first = ("descent", "t", *(("foot_x", "foot_y", "foot_z") if need.checker else ()), *margin)
+                first += ("blurred",) if self.marks and need.checker else ()
                 found |= self._loop("echo_plane", "echo_plane", first)
                 second = ("foot_x", "foot_y", "foot_z", "next_x", "next_y", "next_z", "inv_d2")
-                found |= self._loop("landing", "echo_plane", second)
+                told = ("blurred", "drifted") if self.marks else ()
+                found |= self._loop("landing", "echo_plane", (*second, *told))
                 found["landing_stores"] = self._stores(("p", "foot"), ("mirror", "next"), ("n", "plane"), own=None)
         return found
 
@@ -365,7 +402,7 @@ class _Loops:
         head: str = INDENT,
     ) -> dict[str, object]:
         program = self.programs[part]
-        arrays = scene_parts(self.need)[part].arrays
+        arrays = self.parts[part].arrays
         places = dict.fromkeys(arrays, "p->{}[i]")
         places |= {f"p_{axis}": f"=p->{self.point}_{axis}[i]" for axis in "xyz"}
         steps = program.steps if results is None else closure(program.steps, results)

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from symrender_cg.functions import elementary_header, fast_header, header, precise_header
+from symrender_cg.functions import elementary_header, fast_header, header, lobe_header, precise_header
 from symrender_cg.functions.elementary import elementary_bounds
 from symrender_cg.functions.elementary_pairs import dd_bounds
 from symrender_cg.functions.fast import fast_tables
@@ -19,6 +19,7 @@ from symrender_cg.functions.power import PowerTables, power_tables
 HEADERS: tuple[tuple[str, str, Callable[[str], str]], ...] = (
     (header.TEMPLATE, header.HEADER, header.render_power_header),
     (fast_header.TEMPLATE, fast_header.HEADER, fast_header.render_fast_header),
+    (lobe_header.TEMPLATE, lobe_header.HEADER, lobe_header.render_lobe_header),
     (precise_header.TEMPLATE, precise_header.HEADER, precise_header.render_precise_header),
     (elementary_header.TEMPLATE, elementary_header.HEADER, elementary_header.render_elementary_header),
 )

@@ -11,6 +11,7 @@ freeze          trees of single operations
 convert         operands rounded to their operation, double-double to calls
 bake            frame steps to numbers (only when asked)
 prune, arrange  what nothing uses is left out, sections are brought together
+cut             a pixel's steps in stages, the first ones the same for x and -x (kernels of one sphere that fill spans)
 """
 
 from __future__ import annotations
@@ -28,17 +29,40 @@ from symrender_cg.derive.program import ImageProgram
 from symrender_cg.derive.symbols import INPUTS, symbol
 from symrender_cg.lower import passes
 from symrender_cg.lower.bake import bake
+from symrender_cg.lower.fission import cut
 from symrender_cg.lower.formats import convert_formats
 from symrender_cg.lower.freeze import freeze
 from symrender_cg.lower.program import KernelProgram, Step
+from symrender_cg.lower.symmetry import gather_mirrored
 from symrender_cg.lower.variants import Variant
 from symrender_cg.plan.plan import Plan
 
 FUNCTIONS = {
-    "float64": {"power": "power", "cosine": "power_of_cosine"},
-    "float32": {"power": "powerf", "cosine": "power_of_cosinef"},
-    "fast": {"power": "fast_powerf", "cosine": "fast_power_of_cosinef"},
+    "float64": {
+        "power": "power",
+        "cosine": "power_of_cosine",
+        "log2": "log2_of_lobe",
+        "exp2": "power_of_lobe",
+        "whole": "whole_powers_of_lobe",
+    },
+    "float32": {
+        "power": "powerf",
+        "cosine": "power_of_cosinef",
+        "log2": "log2_of_lobef",
+        "exp2": "power_of_lobef",
+        "whole": "whole_powers_of_lobef",
+    },
+    "fast": {
+        "power": "fast_powerf",
+        "cosine": "fast_power_of_cosinef",
+        "log2": "fast_log2_of_lobef",
+        "log2_of_square": "fast_log2_of_squaref",
+        "exp2": "fast_power_of_lobef",
+    },
     "pair": {"power": "power", "cosine": "precise_power_of_cosine"},
+    "coarse": {"power": "coarse_powerf", "cosine": "coarse_power_of_cosinef"},
+    "libm": {"power": "libm_power", "cosine": "libm_power_of_cosine"},
+    "libmf": {"power": "libm_powerf", "cosine": "libm_power_of_cosinef"},
 }
 
 
@@ -65,14 +89,23 @@ def lower(
         lobe = _cosine_chain(program, exponent)
         return lobe.with_steps(replace(step, value=_folded(step.value.xreplace(n))) for step in lobe.steps)
 
+    def cut_in_stages(program: KernelProgram) -> KernelProgram:
+        return cut(program, fission=variant.passes.fission, symmetry=variant.passes.symmetry)
+
+    staged = variant.staged and not plan.needs("front_test")
+    halves = staged and variant.passes.halves
+    by_squaring = halves and variant.passes.fission and variant.passes.whole and numbers is None
+    whole = FUNCTIONS[variant.powers].get("whole") if by_squaring else None
     sequence: list[tuple[str, Callable[[KernelProgram], KernelProgram]]] = [
         ("assign formats", lambda program: passes.assign_formats(program, variant)),
         ("scale lengths", passes.scale_lengths if variant.exact else _raw_inputs),
         ("regularise", passes.regularise),
         *((("whole exponent", baked_exponent),) if exponent is not None else ()),
-        ("lower powers", lambda program: passes.lower_powers(program, FUNCTIONS[variant.powers])),
+        ("lower powers", lambda program: passes.lower_powers(program, FUNCTIONS[variant.powers], halves=halves)),
+        *((("whole exponent", lambda program: passes.shortcut_power(program, whole)),) if whole else ()),
         ("place", passes.place),
         ("hoist", passes.hoist),
+        *((("gather mirrored", gather_mirrored),) if staged and variant.passes.symmetry else ()),
         ("share", passes.share),
         ("place shares", passes.place),
         *((("carry slow steps in full", passes.carry_slow_in_full),) if variant.shading == "pair" else ()),
@@ -81,6 +114,7 @@ def lower(
         *((("bake", lambda program: bake(program, numbers)),) if numbers is not None else ()),
         ("prune", passes.prune),
         ("arrange", passes.arrange),
+        *((("cut", cut_in_stages),) if staged else ()),
     ]
     start = time.perf_counter()
     program = choose_forms(image, plan, variant)
@@ -98,7 +132,7 @@ def choose_forms(image: ImageProgram, plan: Plan, variant: Variant) -> KernelPro
     off_axis, front_test = plan.needs("off_axis"), plan.needs("front_test")
     entries = (forms.form(name) for name in variant.forms)
     chosen = tuple(entry for entry in entries if entry.fits(image, off_axis=off_axis, front_test=front_test))
-    ends = next((entry.ends for entry in chosen if entry.ends), None)
+    ends = next((entry.ends for entry in chosen if entry.ends), None) if variant.fills else None
     wanted = ("extent_x", "extent_y") if variant.settles and ends else ()
     sight = ("d_dot_d",) if variant.exact else ()  # how sure a hit is, is in |D|^2
     program = forms.apply(image, chosen, keep=(*sight, *wanted))
@@ -146,6 +180,7 @@ def _cosine_chain(program: KernelProgram, exponent: int) -> KernelProgram:
             steps.append(step)
             continue
         better = sp.Piecewise((1 - sin2, sp.Rational(1, 2) - sin2 > 0), (cos2, True))
+        better = cos2 if program["sin2"].value == 1 - cos2 else better
         steps.append(
             replace(step, name="lobe", value=better, meaning="(r.v)^2, accurate where r.v is near 1", source="")
         )

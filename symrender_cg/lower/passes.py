@@ -12,7 +12,7 @@ import sympy as sp
 from symrender_cg.derive.forms import CosinePower
 from symrender_cg.derive.symbols import symbol
 from symrender_cg.lower.nodes import call
-from symrender_cg.lower.program import RATES, Format, KernelProgram, Rate, Step
+from symrender_cg.lower.program import RATES, Format, KernelProgram, Rate, Shortcut, Step
 from symrender_cg.lower.variants import Variant
 
 
@@ -111,10 +111,13 @@ def _at_least_float64(form: Format) -> Format:
     return "float64" if form == "float32" else form
 
 
-def lower_powers(program: KernelProgram, functions: dict[str, str]) -> KernelProgram:
+def lower_powers(program: KernelProgram, functions: dict[str, str], *, halves: bool = False) -> KernelProgram:
     """b^n becomes a call, or for a whole number n a chain of products on named steps; x^2 is left to the freeze pass.
 
+    With `halves`, and where the functions have them, a cosine's power is two steps: its logarithm and 2^y.
+
     CosinePower(cos2, sin2, n)  ->  power_of_cosine(cos2, sin2, n)
+                                or  ..._log2 = log2_of_lobe(cos2, sin2); power_of_lobe(..._log2, n)
     max(0, r_dot_v)^3               ->  ..._1 = max(0, r_dot_v); ..._2 = ..._1 ..._1; ..._2 ..._1
     """
     steps: list[Step] = []
@@ -135,13 +138,47 @@ def lower_powers(program: KernelProgram, functions: dict[str, str]) -> KernelPro
             else:
                 value = value.xreplace({power: call(functions["power"], power.base, power.exp)})
         for power in sorted(value.atoms(CosinePower), key=sp.default_sort_key):
-            value = value.xreplace({power: call(functions["cosine"], *power.args)})
+            if halves and "log2" in functions:
+                cos2, sin2, exponent = power.args
+                told: tuple[sp.Expr, ...] = (cos2, sin2)
+                function = functions["log2"]
+                if "log2_of_square" in functions and program[sin2.name].value == 1 - cos2:
+                    told, function = (cos2,), functions["log2_of_square"]
+                logarithm = replace(
+                    step,
+                    name=f"{step.name}_log2",
+                    value=call(function, *told),
+                    meaning="log2 (r.v)^2",
+                    source="",
+                )
+                steps.append(logarithm)
+                value = value.xreplace({power: call(functions["exp2"], logarithm.symbol, exponent)})
+            else:
+                value = value.xreplace({power: call(functions["cosine"], *power.args)})
         for function, name in ((sp.floor, "floor"), (sp.Abs, "fabs")):
             of_format = f"{name}f" if step.format == "float32" else name
             for applied in sorted(value.atoms(function), key=sp.default_sort_key):
                 value = value.xreplace({applied: call(of_format, *applied.args)})
         steps.append(replace(step, value=value))
     return program.with_steps(steps)
+
+
+def shortcut_power(program: KernelProgram, function: str) -> KernelProgram:
+    """An even whole exponent that is an argument: the power of a block by squaring, in place of its two halves.
+
+    highlight = power_of_lobe(highlight_log2, n)  ->  also half_exponent = half_of_whole(n), once a frame, and where
+                                                      it is not 0: whole_powers_of_lobe(sin2, ..., half_exponent, ...)
+    """
+    if "highlight_log2" not in program:
+        return program
+    source = program["highlight_log2"].value.args[-1].name
+    section = program["highlight"].section
+    exponent = program["highlight"].value.args[-1]
+    meaning = "n / 2 where n is an even whole number, else 0"
+    half = Step("half_exponent", call("half_of_whole", exponent), section, meaning, format="int")
+    steps = [half, *program.steps]
+    first = Shortcut(function, source, "highlight_log2", "highlight", half.name)
+    return replace(program.with_steps(steps), wanted=(*program.wanted, half.name), shortcut=first)
 
 
 def _product_chain(step: Step, base: sp.Expr, exponent: int) -> tuple[list[Step], sp.Expr]:

@@ -41,6 +41,18 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
+class Shortcut:
+    """function(source[], room[], result[], when, count) in place of the stages `stages`, where `when` is not 0."""
+
+    function: str
+    source: str
+    room: str
+    result: str
+    when: str
+    stages: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class KernelProgram:
     """The steps of one kernel in their order.
 
@@ -51,6 +63,9 @@ class KernelProgram:
     wanted   other names that are needed of it
     rates    rates of its symbols that change within a frame, by the inputs' names without `scene_`
     narrow   inputs that come in the format of the shading, from an array that another part wrote
+    stages   names of the steps of a pixel in the stages of fission.py, or none: then they are one piece
+    mirrored how many of the stages, from the first on, are the same for the pixels at x and -x
+    shortcut what computes a step for a whole block where a number of the frame is not 0, in place of some stages
     """
 
     name: str
@@ -63,6 +78,9 @@ class KernelProgram:
     wanted: tuple[str, ...] = ()
     rates: tuple[tuple[str, Rate], ...] = (("y", "row"), ("x", "pixel"))
     narrow: frozenset[str] = frozenset()
+    stages: tuple[tuple[str, ...], ...] = ()
+    mirrored: int = 0
+    shortcut: Shortcut | None = None
 
     def __getitem__(self, name: str) -> Step:
         for step in self.steps:

@@ -7,10 +7,12 @@ kernel and the oracle.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+from dataclasses import dataclass, fields
 from typing import Literal
 
 from symrender_cg.errors import ArgumentError
+from symrender_cg.lower.switches import ALL, Passes
 
 _STABLE_FORMS = (
     "centred_span",
@@ -24,6 +26,9 @@ _STABLE_FORMS = (
     "mirrored_ray",
     "gained",
 )
+
+MOST_ROUNDOFFS = 9.1
+"""Unit roundoffs, 2^-53, that keep an error of `double` below 1e-15."""
 
 _DOUBLE_DOUBLE = frozenset(
     {
@@ -86,7 +91,10 @@ class Variant:
     shading         format of every quantity that is not named below
     float64         quantities kept in float64 where shading is another format
     double_double   quantities kept to 106 bits; where the ray is tested pixel by pixel, also those in `per_pixel_exact`
-    functions       "fast" for powers that are good for grey levels alone
+    functions       "fast" for powers that are good for grey levels alone; others in symrender_cg.lower.choices
+    fills           the row's span of hits is filled without a test; False: every pixel is tested
+    contracts       the compiler may fuse a * b + c into one rounding wherever it likes
+    passes          the passes that make a kernel of one sphere fast and can be left out, each by itself
     settles         the kernel bounds its own error and reports every pixel where the bound does not settle this:
                     the rounding of the true value to a target, or four units in the last place ("ulp")
     """
@@ -101,6 +109,28 @@ class Variant:
     per_pixel_exact: frozenset[str] = frozenset()
     settles: Literal["ulp", "float64", "float32", "uint8"] | None = None
     functions: str = ""
+    fills: bool = True
+    contracts: bool = False
+    passes: Passes = ALL
+
+    @property
+    def staged(self) -> bool:
+        """Whether its kernels of one sphere run in stages: where spans are filled and no bound is carried along."""
+        return self.passes.staged and self.exact and self.fills and self.settles is None
+
+    @property
+    def key(self) -> str:
+        """What tells its kernels from those of others: the name, and for a variant that is no level a digest of it."""
+        if any(self is entry for entry in (*VARIANTS, *LEVELS)):
+            return self.name
+        values = [getattr(self, entry.name) for entry in fields(self)]
+        told = repr([sorted(value) if isinstance(value, frozenset) else value for value in values])
+        return f"{self.name}:{hashlib.sha256(told.encode()).hexdigest()[:16]}"
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Compiler flags beyond those of every kernel."""
+        return ("-ffp-contract=fast",) if self.contracts else ()
 
     @property
     def powers(self) -> str:
@@ -151,8 +181,8 @@ VARIANTS: tuple[Variant, ...] = (
     ),
     Variant(
         "double",
-        "about 1e-15 absolute where the light is farther than 1e-3 R from the surface and n >= 1 (a gated highlight "
-        "may be switched wrongly within rounding of the terminator); no overflow; hit or miss never wrong",
+        "at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and n <= 1000; another kernel "
+        "draws what this one may not; no overflow; hit or miss never wrong",
         "float64",
         _STABLE_FORMS,
         exact=True,
@@ -206,11 +236,14 @@ ACCURACIES = (*(entry.name for entry in VARIANTS), "stable", "certified")
 """What a user may ask for."""
 
 
-def variant(name: str, target: str | None = None) -> Variant:
-    """The variant of that level, for `certified` that of its target (by default float64).
+def variant(name: str | Variant, target: str | None = None) -> Variant:
+    """The variant of that level, for `certified` that of its target (by default float64), or of a level with choices
+    (`single_fused`, see symrender_cg.lower.choices); a variant is itself.
 
     Raises ArgumentError naming the known ones.
     """
+    if isinstance(name, Variant):
+        return name
     wanted = name
     if name == "certified":
         if target not in (None, *TARGETS):
@@ -221,4 +254,9 @@ def variant(name: str, target: str | None = None) -> Variant:
     for entry in (*VARIANTS, *LEVELS):
         if entry.name == wanted:
             return entry
+    if "_" in wanted and target is None:
+        from symrender_cg.lower.choices import named
+
+        if (found := named(wanted)) is not None:
+            return found
     raise ArgumentError(f"accuracy: {name!r} is not known; expected one of {', '.join(map(repr, ACCURACIES))}")

@@ -40,7 +40,8 @@ from symrender_cg.reference.check_rows import FAST_SHININESS, STATED_ULP, Row
 from symrender_cg.run.drawing import Drawing
 from symrender_cg.run.levels import job_of
 from symrender_cg.run.numbers import numbers_of
-from symrender_cg.run.render import evaluate, shape_of
+from symrender_cg.run.ready import shape_of
+from symrender_cg.run.render import evaluate
 from symrender_cg.run.scene_kernel import SceneKernel
 from symrender_cg.run.scene_numbers import scene_numbers
 from symrender_cg.scene import Phong, Scene
@@ -208,7 +209,8 @@ def _draw(drawing: Drawing, values: npt.NDArray[Any], points: _Points) -> None:
 
 def seen(drawing: Drawing, points: _Points, truth: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Which surface the kernel sees at each point, as the oracle numbers them: the kernel drawn with the scene's own
-    lists, where every surface has an ambient coefficient of its own and nothing else adds light.
+    lists, where every surface has an ambient coefficient of its own and nothing else adds light. Points that the kernel
+    leaves open are not its decision: there it is `truth`.
 
     The kernel of one sphere knows hit and miss alone: where it agrees with `truth` in that, that is what it sees.
     """
@@ -232,7 +234,7 @@ def seen(drawing: Drawing, points: _Points, truth: npt.NDArray[np.int64]) -> npt
     width, height = points.size or (1, 1)
     prepared = kernel.prepare(numbers, width=width, height=height, pixel=drawing.pixel, white=math.inf)
     values = np.empty(drawing.shape(*points.x.shape), drawing.dtype)
-    _draw(replace(drawing, numbers=prepared), values, points)
+    _draw(replace(drawing, numbers=prepared, decide=_left_open), values, points)
     first = values if kernel.channels == 1 else values[..., 0]
     planes = arrangement.receivers - len(arrangement.spheres)
     table = np.concatenate(([-1], arrangement.spheres, [len(plan.given.spheres)] * planes, [-2])).astype(np.int64)
@@ -240,7 +242,15 @@ def seen(drawing: Drawing, points: _Points, truth: npt.NDArray[np.int64]) -> npt
         whole = np.where(np.isfinite(first), first, -1.0).astype(np.int64)
     known = (whole == first) & (whole >= 0) & (whole <= arrangement.receivers)
     found: npt.NDArray[np.int64] = table[np.where(known, whole, len(table) - 1)]
-    return found
+    return np.where(first == _OPEN, truth, found)
+
+
+_OPEN = -2.0
+
+
+def _left_open(x: Floats, _: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """In place of what settles a kernel's doubts: a mark."""
+    return np.full((x.size, 1), _OPEN), np.ones(x.size, dtype=np.bool_)
 
 
 # ------------------------------------------------------------------------------------------------------ where to look

@@ -119,31 +119,35 @@ class _Points(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class _Image:
+    """Rows of an image of that height, from row `first` on; all of them, or some."""
+
     shape: tuple[int, int]
     pixel: float
+    height: int
+    first: int = 0
 
     def at(self, places: Places) -> tuple[Floats, Floats]:
-        height, width = self.shape
-        columns, rows = pixel_centres(width, height, self.pixel)
-        return columns[places % width], rows[places // width]
+        width = self.shape[1]
+        columns, rows = pixel_centres(width, self.height, self.pixel)
+        return columns[places % width], rows[self.first + places // width]
 
     def name(self, place: int) -> str:
-        return f"column {place % self.shape[1]}, row {place // self.shape[1]}"
+        return f"column {place % self.shape[1]}, row {self.first + place // self.shape[1]}"
 
     def settle(self, job: Job, kernel: SettlingKernel, numbers: Any) -> tuple[NDArray[Any], Places, float]:
-        """The image, the pixels that are left over, and the kernel's bound."""
-        height, width = self.shape
+        """The rows, the pixels of them that are left over, and the kernel's bound."""
+        count, width = self.shape
+        first, height = self.first, self.height
         image = np.empty(self.shape, dtype=kernel.dtype)
         left_over: list[Places] = []
 
         def some(begin: int, end: int) -> None:
-            left_over.append(
-                kernel.settle_rows(image, numbers, pixel=self.pixel, white=job.white, begin=begin, end=end)
-            )
+            rows = {"begin": first + begin, "end": first + end, "first": first, "height": height}
+            left_over.append(kernel.settle_rows(image, numbers, pixel=self.pixel, white=job.white, **rows))
 
-        over_rows(some, height, thread_count(job.threads, width * height))
+        over_rows(some, count, thread_count(job.threads, width * count), width=width)
         bound = kernel.bound(numbers, width=width, height=height, pixel=self.pixel)
-        return image, np.sort(np.concatenate(left_over)), bound
+        return image, np.sort(np.concatenate(left_over)) - first * width, bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,13 +175,46 @@ def settle_image(job: Job, width: int, height: int) -> Certified:
 
     Raises AccuracyError naming the pixels that even the oracle leaves open.
     """
-    return _settled(job, lambda frame: _Image((height, width), pixel_size(frame, height)), width / height)
+    return settle_rows(job, width, height, 0, height)
+
+
+def settle_rows(job: Job, width: int, height: int, first: int, last: int) -> Certified:
+    """Rows [first, last) of that image, the same bits; shape (last - first, width), or (last - first, width, 3)."""
+
+    def rows(frame: Scene) -> _Image:
+        return _Image((last - first, width), pixel_size(frame, height), height, first)
+
+    return _settled(job, rows, width / height)
 
 
 def settle_points(job: Job, x: Floats, y: Floats) -> Certified:
     """The same for points of the image plane; x and y of one shape, which is that of the values."""
     columns, rows = (np.ascontiguousarray(a, dtype=np.float64).reshape(-1) for a in (x, y))
     return _settled(job, lambda _: _Cloud(x.shape, columns, rows), None)
+
+
+def settle_if_known(job: Job, x: Floats, y: Floats) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Values at points by the job's rule, by enclosure and oracle, and which of them are known: not those that rest on
+    a tie that nothing decides. x and y of shape (points,); values (points, channels)."""
+    points = _Cloud(x.shape, x, y)
+    values = np.empty((x.size, _channels(job.scene)), dtype=job.variant.result)
+    known = np.zeros(x.size, dtype=np.bool_)
+    places = np.arange(x.size)
+    for stage in (_enclosed, _asked):
+        try:
+            rounded, is_settled, _ = stage(job, points, places)
+        except AccuracyError as open_points:
+            places = np.setdiff1d(places, np.asarray(open_points.points, dtype=np.intp))
+            if not places.size:
+                break
+            rounded, is_settled, _ = stage(job, points, places)
+        settled_here = places[is_settled]
+        values[settled_here] = rounded.reshape(places.size, -1)[is_settled]
+        known[settled_here] = True
+        places = places[~is_settled]
+        if not places.size:
+            break
+    return values, known
 
 
 def _settled(job: Job, points_of: Callable[[Scene], _Points], aspect: float | None) -> Certified:

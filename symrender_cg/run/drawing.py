@@ -5,9 +5,9 @@ The two kinds of kernels, of one sphere and of scenes, look the same from here o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,9 @@ class Drawing:
     numbers    the scene as the kernel takes it
     pixel      side of a pixel in scene units
     white      intensity above which white is written, inf for the field itself
+    decide     (x, y) -> values at points where rounding may have decided, and which of them are known; None: the kernel
+               of the level decides nothing by rounding, or promises nothing of it
+    width      of the image in pixels, and its height; 1 and 1 for points
     """
 
     plan: Plan
@@ -36,6 +39,15 @@ class Drawing:
     numbers: Any
     pixel: float
     white: float
+    decide: Decide | None = None
+    width: int = 1
+    height: int = 1
+
+    @cached_property
+    def grid(self) -> Any:
+        """The pixels as the kernel of one sphere takes them."""
+        assert isinstance(self.kernel, Kernel), "a scene's tables hold its grid"
+        return self.kernel.grid(self.width, self.height, self.pixel, self.white)
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -51,30 +63,76 @@ class Drawing:
         """The shape of an array of intensities: that of the points, and the channels where there are three."""
         return points if self.channels == 1 else (*points, self.channels)
 
-    def rows(self, image: NDArray[Any], begin: int, end: int, layers: Mapping[str, NDArray[Any]] | None = None) -> None:
-        """Writes rows [begin, end) of an image with contiguous rows; `layers` only of kernels of scenes."""
-        if isinstance(self.kernel, SceneKernel):
-            self.kernel.rows(image, self.numbers, begin=begin, end=end, layers=layers)
-        else:
-            self.kernel.rows(image, self.numbers, pixel=self.pixel, white=self.white, begin=begin, end=end)
+    def onto(self, image: NDArray[Any], first: int = 0) -> Callable[[int, int], None]:
+        """What writes rows [begin, end) of the image into an array with contiguous rows, whose row 0 is row `first`."""
+        if isinstance(self.kernel, Kernel):
+            return self.kernel.onto(image, self.numbers, self.grid, first=first)
+        return partial(self._scene_rows, image, first)
+
+    def _scene_rows(self, image: NDArray[Any], first: int, begin: int, end: int) -> None:
+        self.rows(image, begin, end, first=first)
+
+    def rows(
+        self,
+        image: NDArray[Any],
+        begin: int,
+        end: int,
+        layers: Mapping[str, NDArray[Any]] | None = None,
+        *,
+        first: int = 0,
+    ) -> None:
+        """Writes rows [begin, end) of the image into an array with contiguous rows, whose row 0 is row `first`.
+
+        `layers` only of kernels of scenes, and of the whole image; with layers the image stays as the kernel has it, in
+        doubtful pixels too: it is the sum of its terms.
+        """
+        if isinstance(self.kernel, Kernel):
+            self.onto(image, first)(begin, end)
+            return
+        doubtful = self.kernel.rows(image, self.numbers, begin=begin, end=end, layers=layers, first=first)
+        if doubtful.size and self.decide is not None and layers is None:
+            row, column = doubtful // self.width, doubtful % self.width
+            x = (column + (0.5 - 0.5 * self.width)) * np.float64(self.pixel)
+            y = ((0.5 * self.height - 0.5) - row) * np.float64(self.pixel)
+            values, known = self.decide(x, y)
+            image[row[known] - first, column[known]] = self._narrowed(values[known])
 
     def points(self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
         """Writes the intensities at contiguous points of the image plane."""
         if isinstance(self.kernel, SceneKernel):
-            self.kernel.points(values, x, y, self.numbers)
+            doubtful = self.kernel.points(values, x, y, self.numbers)
+            if doubtful.size and self.decide is not None:
+                found, known = self.decide(x.reshape(-1)[doubtful], y.reshape(-1)[doubtful])
+                flat = values.reshape(x.size, *values.shape[x.ndim :])
+                flat[doubtful[known]] = self._narrowed(found[known])
         else:
             self.kernel.points(values, x, y, self.numbers, white=self.white)
 
+    def _narrowed(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Settled values as the kernel would have written them: in its channels, white at most."""
+        cut: NDArray[Any] = np.minimum(values, self.white)
+        return cut[:, 0] if self.channels == 1 else cut
+
+
+Decide = Callable[[NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[Any], NDArray[np.bool_]]]
+
 
 def bind(
-    kernel: Kernel | SceneKernel, plan: Plan, *, width: int = 1, height: int = 1, pixel: float = 1.0, white: float
+    kernel: Kernel | SceneKernel,
+    plan: Plan,
+    *,
+    width: int = 1,
+    height: int = 1,
+    pixel: float = 1.0,
+    white: float,
+    decide: Decide | None = None,
 ) -> Drawing:
     """A kernel and a plan that it was made for, with the numbers of the plan's scene."""
     if isinstance(kernel, SceneKernel):
         numbers: Any = _prepared(kernel, SamePlan(plan), width, height, pixel, white)
     else:
         numbers = kernel.numbers(numbers_of(plan.scene))
-    return Drawing(plan, kernel, numbers, pixel, white)
+    return Drawing(plan, kernel, numbers, pixel, white, decide, width, height)
 
 
 class SamePlan:

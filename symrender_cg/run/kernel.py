@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,19 @@ from numpy.typing import NDArray
 
 from symrender_cg.build.library import CachedKernel, Library
 from symrender_cg.errors import LibraryError
+
+GRID = np.dtype([("width", np.int32), ("height", np.int32), ("pixel", np.float64), ("white", np.float64)])
+"""symrender_grid, as the C lays it out."""
+
+
+def pointer_to(image: NDArray[Any], kind: str, library: Library, *, first: int = 0) -> Any:
+    """A pointer to row 0 of the image whose rows from `first` on the array holds, to be written from there on.
+
+    For a contiguous array that begins with row 0 it keeps the memory alive.
+    """
+    if first == 0 and image.flags.c_contiguous and image.size:
+        return library.ffi.from_buffer(kind, image, True)
+    return library.ffi.cast(kind, image.ctypes.data - first * image.strides[0])
 
 
 @dataclass(frozen=True)
@@ -47,13 +61,34 @@ class Kernel:
         end: int,
     ) -> None:
         """Writes rows [begin, end) of an image of this kernel's dtype whose rows are contiguous. Releases the GIL."""
-        ffi = self.library.ffi
         height, width = image.shape
-        grid = ffi.new("symrender_grid *", (width, height, pixel, white))
-        pointer = ffi.cast(f"{self._real} *", image.ctypes.data)
-        stride = image.strides[0] // image.itemsize
-        arguments = (pointer, stride, grid) if self.baked else (pointer, stride, grid, numbers)
-        self._entry("rows")(*arguments, begin, end)
+        self.onto(image, numbers, self.grid(width, height, pixel, white))(begin, end)
+
+    def grid(self, width: int, height: int, pixel: float, white: float) -> Any:
+        """The grid structure as C sees it, to be reused over calls."""
+        return self.library.ffi.new("symrender_grid *", (width, height, pixel, white))
+
+    def onto(self, image: NDArray[Any], numbers: Any, grid: Any, *, first: int = 0) -> Callable[[int, int], None]:
+        """The C function that writes rows [begin, end), bound to everything else: a call of it runs no Python.
+
+        first: the row that row 0 of the array is; it may hold a part of the image's rows. The array must be kept.
+        """
+        pointer = pointer_to(image, f"{self._real} *", self.library, first=first)
+        stride, entry = image.strides[0] // image.itemsize, self._entry("rows")
+        return partial(entry, pointer, stride, grid) if self.baked else partial(entry, pointer, stride, grid, numbers)
+
+    def onto_many(self, images: NDArray[Any], numbers: NDArray[np.float64], grids: NDArray[Any]) -> Callable[..., None]:
+        """The C function that writes rows [begin, end) of many images, counted through: row j of image k is number
+        k * height + j.
+
+        images: (count, height, width) with contiguous rows. numbers: (count, inputs). grids: (count,) of GRID. All
+        three must be kept.
+        """
+        ffi, item = self.library.ffi, images.itemsize
+        pointer = pointer_to(images, f"{self._real} *", self.library)
+        strides = images.strides[0] // item, images.strides[1] // item
+        grid, scenes = ffi.from_buffer("symrender_grid *", grids), ffi.from_buffer("double *", numbers)
+        return partial(self._entry("batch"), pointer, *strides, grid, scenes)
 
     def points(
         self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], numbers: Any, *, white: float

@@ -13,21 +13,17 @@ from functools import lru_cache
 from pathlib import Path
 
 from symrender_cg.errors import ArgumentError
-from symrender_cg.lower.variants import variant
+from symrender_cg.lower.variants import MOST_ROUNDOFFS, Variant, variant
 from symrender_cg.pipeline import planned
 from symrender_cg.run.certify import Job
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.scene import Scene
 
-MOST_ROUNDOFFS = 9.1
-"""Unit roundoffs, 2^-53, that keep an error of `double` below 1e-15."""
-
-
 MOST_SHININESS = 1000.0
 """The largest exponent that `fast` keeps its promise for."""
 
 
-def drawn_as(scene: Scene, accuracy: str) -> str:
+def drawn_as(scene: Scene, accuracy: str | Variant) -> str | Variant:
     """The level whose kernel draws the scene: the one that is asked for, but for `fast` under large exponents."""
     if accuracy != "fast":
         return accuracy
@@ -39,7 +35,7 @@ def drawn_as(scene: Scene, accuracy: str) -> str:
 
 def job_of(
     scene: Scene,
-    accuracy: str,
+    accuracy: str | Variant,
     target: str | None = None,
     *,
     clip: bool,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from symrender_cg.errors import ArgumentError, OutsidePlanError
+from symrender_cg.lower.variants import Variant
 from symrender_cg.pipeline import draw, pixel_size
+from symrender_cg.run.blocks import SettledRows
 from symrender_cg.run.bounds import error_bounds
-from symrender_cg.run.certify import Certified, settle_image, settle_points
+from symrender_cg.run.certify import Certified, Job, settle_image, settle_points
 from symrender_cg.run.grid import pixel_centres
 from symrender_cg.run.levels import drawn_as, job_of
+from symrender_cg.run.ready import checked_out, ready, shape_of, side
 from symrender_cg.run.scene_kernel import LAYERS, layer_arrays
 from symrender_cg.run.threads import over_rows, thread_count
 from symrender_cg.scene import PointLight, Scene, load_scene
@@ -23,16 +26,17 @@ from symrender_cg.scene import PointLight, Scene, load_scene
 if TYPE_CHECKING:
     from symrender_cg.plan.plan import Plan
 
-LARGEST_SIDE = 1 << 24
-
 
 def render_image(
     scene: Scene | str | Path | None = None,
     width: int = 256,
     height: int = 256,
     *,
-    accuracy: str = "double",
+    accuracy: str | Variant = "double",
     target: str | None = None,
+    max_error: float | None = None,
+    max_ulp: float | None = None,
+    bits: float | None = None,
     clip: bool = True,
     out: NDArray[Any] | None = None,
     threads: int | None = None,
@@ -49,6 +53,8 @@ def render_image(
     accuracy   "literal" (the seed's formula), "single" (float32, returns it), "double" (cancellation-free float64),
                "stable" (within 4 ulp), "certified" (every value correctly rounded, see `certify`)
     target     what "certified" rounds to, and returns: "float64", "float32" or "uint8" (grey levels of 0 to 255)
+    max_error  in place of accuracy: the fastest variant on this machine whose error is at most this, unclipped
+    max_ulp    the same in units of the last place; `bits`: half a step of so many bits (see symrender_cg.cost.choose)
     clip       cut to [0, 1] as a picture is; False keeps the field itself, which may exceed 1
     out        array of that shape and dtype to write into; any strides, writable
     threads    threads over rows; any number gives the same bits
@@ -58,31 +64,41 @@ def render_image(
     cache      folder for compiled kernels; by default SYMRENDER_CACHE_DIR, or the user's cache folder
 
     Raises ArgumentError, SceneError, OutsidePlanError or ToolchainError, and AccuracyError where no certificate can be
-    given, see symrender_cg.errors.
+    given or nothing meets what is asked for, see symrender_cg.errors.
     """
-    width, height = _side("width", width), _side("height", height)
-    chosen = load_scene(scene)
-    shape = shape_of(chosen, height, width)
+    if max_error is not None or max_ulp is not None or bits is not None:
+        given = _choosing(accuracy, target, bake, portable, backend)
+        accuracy, target = _meeting(scene, max_error, max_ulp, bits, given, out=out, cache=cache)
     if backend == "numpy":
+        width, height = side("width", width), side("height", height)
+        chosen = load_scene(scene)
         frame = chosen.in_camera_frame()
         columns, rows = pixel_centres(width, height, pixel_size(frame, height))
         values = _numpy_backend(frame, columns[np.newaxis, :], rows[:, np.newaxis], accuracy, clip)
-        return values if out is None else _copied(values, _checked(out, shape, values.dtype))
+        return values if out is None else _copied(values, checked_out(out, values.shape, values.dtype))
     _require_native(backend)
-    job = job_of(chosen, accuracy, target, clip=clip, bake=bake, portable=portable, cache=cache, threads=threads)
-    if job is not None:
-        if out is not None:
-            _checked(out, shape, np.dtype(job.variant.result))
-        values = settle_image(job, width, height).values
-        return values if out is None else _copied(values, out)
-    drawn = drawn_as(chosen, accuracy)
-    drawing = draw(chosen, drawn, size=(width, height), clip=clip, bake=bake, portable=portable, cache=cache)
-    image = np.empty(shape, drawing.dtype) if out is None else _checked(out, shape, drawing.dtype)
-    canvas = image
-    if drawing.shape(height, width) != shape or not _rows_are_contiguous(image):
-        canvas = np.empty(drawing.shape(height, width), drawing.dtype)
-    over_rows(partial(drawing.rows, canvas), height, thread_count(threads, width * height))
-    return image if canvas is image else _copied(_as_colour(canvas, shape), image)
+    found = ready(
+        scene,
+        width,
+        height,
+        accuracy=accuracy,
+        target=target,
+        clip=clip,
+        bake=bake,
+        portable=portable,
+        cache=cache,
+        threads=threads,
+    )
+    if isinstance(found, Job):
+        width, height = side("width", width), side("height", height)
+        if out is None:
+            return settle_image(found, width, height).values
+        settled = SettledRows(found, width, height)
+        settled.draw(checked_out(out, settled.shape, settled.dtype), threads=threads)
+        return out
+    image = np.empty(found.shape, found.dtype) if out is None else checked_out(out, found.shape, found.dtype)
+    found.draw(image, threads=threads)
+    return image
 
 
 def certify(
@@ -104,7 +120,7 @@ def certify(
     Raises AccuracyError, whose message and `points` (row * width + column) name the pixels, where a value rests on a
     tie that nothing decides.
     """
-    width, height = _side("width", width), _side("height", height)
+    width, height = side("width", width), side("height", height)
     job = job_of(load_scene(scene), "certified", target, clip=clip, portable=portable, cache=cache, threads=threads)
     assert job is not None
     return settle_image(job, width, height)
@@ -133,7 +149,7 @@ def render_layers(
 
     The terms add up to the unclipped image. Raises ArgumentError for an unknown name.
     """
-    width, height = _side("width", width), _side("height", height)
+    width, height = side("width", width), side("height", height)
     names = tuple(dict.fromkeys(layers))
     if unknown := [name for name in names if name not in LAYERS]:
         raise ArgumentError(f"layers: {unknown[0]!r} is not known; expected some of {', '.join(LAYERS)}")
@@ -142,7 +158,7 @@ def render_layers(
     drawing = draw(chosen, drawn, size=(width, height), clip=clip, portable=portable, force=("scene",), cache=cache)
     arrays = layer_arrays(names, (height, width), drawing.channels, len(chosen.lights))
     image = np.empty(drawing.shape(height, width), drawing.dtype)
-    over_rows(partial(drawing.rows, image, layers=arrays), height, thread_count(threads, width * height))
+    over_rows(partial(drawing.rows, image, layers=arrays), height, thread_count(threads, width * height), width=width)
     shape = shape_of(chosen, height, width)
     found: dict[str, NDArray[Any]] = {"image": _as_colour(image, shape).copy()}
     for name, array in arrays.items():
@@ -161,8 +177,11 @@ def evaluate(
     x: ArrayLike,
     y: ArrayLike,
     *,
-    accuracy: str = "double",
+    accuracy: str | Variant = "double",
     target: str | None = None,
+    max_error: float | None = None,
+    max_ulp: float | None = None,
+    bits: float | None = None,
     with_bound: bool = False,
     clip: bool = False,
     bake: bool = False,
@@ -182,6 +201,9 @@ def evaluate(
     """
     chosen = load_scene(scene)
     points_x, points_y = _points(x, y)
+    if max_error is not None or max_ulp is not None or bits is not None:
+        given = _choosing(accuracy, target, bake, portable, backend)
+        accuracy, target = _meeting(chosen, max_error, max_ulp, bits, given, points=(points_x, points_y), cache=cache)
     if with_bound:
         values = evaluate(
             chosen,
@@ -208,15 +230,30 @@ def evaluate(
     return np.array(_as_colour(values, shape_of(chosen, *points_x.shape)))
 
 
-def shape_of(scene: Scene, *points: int) -> tuple[int, ...]:
-    """The shape of a scene's intensities at an array of points of that shape."""
-    channels = _channels(scene)
-    return points if channels == 1 else (*points, channels)
+def _choosing(
+    accuracy: str | Variant, target: str | None, bake: bool, portable: bool, backend: str
+) -> dict[str, tuple[Any, Any]]:
+    """Arguments that choose a kernel, each with what it is if it is left out."""
+    return {
+        "accuracy": (accuracy, "double"),
+        "target": (target, None),
+        "bake": (bake, False),
+        "portable": (portable, False),
+        "backend": (backend, "native"),
+    }
 
 
-@lru_cache(maxsize=256)
-def _channels(scene: Scene) -> int:
-    return scene.channels
+def _meeting(
+    scene: Scene | str | Path | None,
+    max_error: float | None,
+    max_ulp: float | None,
+    bits: float | None,
+    given: dict[str, tuple[Any, Any]],
+    **how: Any,
+) -> tuple[str, str | None]:
+    from symrender_cg.cost.asked import meeting
+
+    return meeting(scene, max_error=max_error, max_ulp=max_ulp, bits=bits, given=given, **how)
 
 
 def _as_colour(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
@@ -234,7 +271,7 @@ def _scene_indices(positions: NDArray[Any], plan: Plan) -> NDArray[Any]:
 
 
 def _numpy_backend(
-    frame: Scene, x: NDArray[np.float64], y: NDArray[np.float64], accuracy: str, clip: bool
+    frame: Scene, x: NDArray[np.float64], y: NDArray[np.float64], accuracy: str | Variant, clip: bool
 ) -> NDArray[Any]:
     from symrender_cg.lower.variants import variant
 
@@ -273,14 +310,6 @@ def _require_native(backend: str) -> None:
         raise ArgumentError(f"backend: {backend!r} is not known; expected 'native' or 'numpy'")
 
 
-def _side(name: str, value: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= LARGEST_SIDE:
-        raise ArgumentError(
-            f"{name}: {value!r} is not a number of pixels; expected a whole number from 1 to {LARGEST_SIDE}"
-        )
-    return int(value)
-
-
 def _points(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     points_x, points_y = _coordinates("x", x), _coordinates("y", y)
     try:
@@ -303,25 +332,6 @@ def _coordinates(name: str, values: ArrayLike) -> NDArray[np.float64]:
         place = f"{name}[{', '.join(map(str, index))}]" if points.ndim else name
         raise ArgumentError(f"{place}: {points[tuple(index)]} is not a point; expected finite coordinates")
     return points
-
-
-def _checked(out: NDArray[Any], shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-    if not isinstance(out, np.ndarray):
-        raise ArgumentError(f"out: expected a numpy array of shape {shape} and dtype {dtype}, not {type(out).__name__}")
-    if out.shape != shape:
-        words = "(height, width)" if len(shape) == 2 else "(height, width, 3)"
-        raise ArgumentError(f"out: has shape {out.shape}; expected {words} = {shape}")
-    if out.dtype != dtype:
-        raise ArgumentError(f"out: has dtype {out.dtype}; this accuracy writes {dtype}")
-    if not out.flags.writeable:
-        raise ArgumentError("out: is read-only; pass an array that can be written to")
-    return out
-
-
-def _rows_are_contiguous(image: NDArray[Any]) -> bool:
-    item = image.itemsize
-    steps = (item,) if image.ndim == 2 else (item * image.shape[2], item)
-    return image.strides[1:] == steps and image.strides[0] % item == 0 and image.ctypes.data % item == 0
 
 
 def _copied(values: NDArray[Any], out: NDArray[Any]) -> NDArray[Any]:

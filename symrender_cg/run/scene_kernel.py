@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.build.library import CachedKernel, Library
+from symrender_cg.run.kernel import pointer_to
 
 LAYERS = ("depth", "normal", "index", "background", "ambient", "reflected", "diffuse", "specular")
 """What a kernel can write beside the image, in the order of its C structure's fields."""
@@ -72,36 +73,52 @@ class SceneKernel:
         begin: int,
         end: int,
         layers: Mapping[str, NDArray[Any]] | None = None,
-    ) -> None:
-        """Writes rows [begin, end) of an image whose rows are contiguous. Releases the GIL.
+        first: int = 0,
+    ) -> NDArray[np.intp]:
+        """Writes rows [begin, end) of an image whose rows are contiguous; which pixels, row * width + column, rounding
+        may have decided. Releases the GIL.
 
         layers: by names of LAYERS, contiguous arrays of whole images; float64, int32 for `index`.
+        first: the row that row 0 of the array is; it may hold a part of the image's rows.
         """
         ffi = self.library.ffi
-        pointer = ffi.cast(f"{self._real} *", image.ctypes.data)
+        pointer = pointer_to(image, f"{self._real} *", self.library, first=first)
         wanted = ffi.NULL
         if layers:
             wanted = ffi.new(f"{self.name}_layers *")
             for name, array in layers.items():
                 setattr(wanted, name, ffi.cast("int *" if name == "index" else "double *", array.ctypes.data))
-        status = getattr(self.library.lib, f"{self.name}_rows")(
-            pointer, image.strides[0] // image.itemsize, prepared.frame, wanted, begin, end
+        unsettled = np.empty((end - begin) * image.shape[1], dtype=np.intp)
+        found = getattr(self.library.lib, f"{self.name}_rows")(
+            pointer,
+            image.strides[0] // image.itemsize,
+            prepared.frame,
+            wanted,
+            begin,
+            end,
+            ffi.cast("ptrdiff_t *", unsettled.ctypes.data),
         )
-        if status:
+        if found < 0:
             raise MemoryError(f"no memory for rows {begin} to {end} of the image")
+        return unsettled[:found].copy()
 
-    def points(self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], prepared: Prepared) -> None:
-        """Writes the intensities at contiguous points. Releases the GIL."""
+    def points(
+        self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], prepared: Prepared
+    ) -> NDArray[np.intp]:
+        """Writes the intensities at contiguous points; which of them rounding may have decided. Releases the GIL."""
         ffi = self.library.ffi
-        status = getattr(self.library.lib, f"{self.name}_points")(
+        unsettled = np.empty(x.size, dtype=np.intp)
+        found = getattr(self.library.lib, f"{self.name}_points")(
             ffi.cast(f"{self._real} *", values.ctypes.data),
             ffi.cast("double *", x.ctypes.data),
             ffi.cast("double *", y.ctypes.data),
             x.size,
             prepared.frame,
+            ffi.cast("ptrdiff_t *", unsettled.ctypes.data),
         )
-        if status:
+        if found < 0:
             raise MemoryError("no memory for the points")
+        return unsettled[:found].copy()
 
     @property
     def _real(self) -> str:

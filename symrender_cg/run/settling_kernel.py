@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symrender_cg.run.kernel import Kernel
+from symrender_cg.run.kernel import Kernel, pointer_to
 
 _KEPT = 1 << 20
 """Places that a thread keeps memory for: fresh memory costs more than a kernel's work on it."""
@@ -32,17 +32,29 @@ class SettlingKernel(Kernel):
     """A `Kernel` whose entry points return the places of what they could not settle."""
 
     def settle_rows(
-        self, image: NDArray[Any], numbers: Any, *, pixel: float, white: float, begin: int, end: int
+        self,
+        image: NDArray[Any],
+        numbers: Any,
+        *,
+        pixel: float,
+        white: float,
+        begin: int,
+        end: int,
+        first: int = 0,
+        height: int | None = None,
     ) -> NDArray[np.intp]:
         """Writes rows [begin, end) of an image with contiguous rows; the numbers row * width + column of the pixels of
-        them that are not settled. Releases the GIL."""
+        them that are not settled. Releases the GIL.
+
+        The array may hold a part of an image of that height, from row `first` on.
+        """
         ffi = self.library.ffi
-        height, width = image.shape
+        held, width = image.shape
         left_over = _scratch((end - begin) * width)
         found = self._entry("rows")(
-            ffi.cast(f"{self._real} *", image.ctypes.data),
+            pointer_to(image, f"{self._real} *", self.library, first=first),
             image.strides[0] // image.itemsize,
-            ffi.new("symrender_grid *", (width, height, pixel, white)),
+            self.grid(width, held if height is None else height, pixel, white),
             numbers,
             begin,
             end,

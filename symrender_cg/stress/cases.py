@@ -120,7 +120,6 @@ class Family:
     source         where the difficulty is known from
     draw           Dice -> (scene or numbers, x, y, note), or None where these numbers hold no such case
     refused        some or all cases are numbers without an image, which must be refused
-    jumps          the image itself jumps within rounding of these points, so that a decision and no digit is at stake
     """
 
     name: str
@@ -129,7 +128,6 @@ class Family:
     source: str
     draw: Callable[[Dice], Drawn | None]
     refused: bool = False
-    jumps: bool = False
 
     def cases(self, seed: int, count: int) -> tuple[Case, ...]:
         """`count` cases; case k is a function of the family's name, the seed and k."""

@@ -217,7 +217,6 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "the image jumps where n.l changes sign",
         _WOO,
         light.gated_terminator,
-        jumps=True,
     ),
     Family(
         "shadow_edge",
@@ -225,7 +224,6 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "whether the way to the light passes a sphere is the sign of a small difference",
         _WOO,
         scene.shadow_edge,
-        jumps=True,
     ),
     Family(
         "contact",
@@ -233,7 +231,6 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "near the contact which sphere is seen, and which shadows which, hangs on the last place",
         _WOO,
         scene.contact,
-        jumps=True,
     ),
     Family(
         "eye_plane",
@@ -248,7 +245,6 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "a rounding of the mirrored ray's direction moves its far end by the distance",
         "Igehy 1999, ray differentials",
         scene.far_mirror,
-        jumps=True,
     ),
     Family(
         "mirror_edge",
@@ -256,7 +252,6 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "what a mirrored ray meets is decided after it was rounded",
         "Igehy 1999, ray differentials",
         scene.mirrored_outline,
-        jumps=True,
     ),
     Family(
         "near_depths",
@@ -264,7 +259,6 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "which of two spheres that cut each other is in front, and which shadows the other, at 1e-1 to 1e-17",
         "Catmull 1974, depth buffer",
         scene.near_depths,
-        jumps=True,
     ),
     Family(
         "horizon_light",
@@ -279,7 +273,6 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "the floor of a number that is whole, to rounding",
         _GOLDBERG,
         scene.tile_edge,
-        jumps=True,
     ),
 )
 

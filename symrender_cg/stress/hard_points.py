@@ -30,10 +30,9 @@ MOST_PAIRS: Final = 24
 
 @dataclass(frozen=True, slots=True)
 class HardPoints:
-    """A set of points; `jumps` where the image itself may jump within rounding of them."""
+    """A set of points, and what they lie near to."""
 
     name: str
-    jumps: bool
     points: list[tuple[float, float]]
 
 
@@ -42,17 +41,15 @@ def hard_points(frame: Scene, count: int, seed: int) -> tuple[HardPoints, ...]:
     half_height = frame.camera.half_height
     assert half_height is not None, "a scene in the camera's frame has a half_height"
     x, y = np.random.default_rng(seed).uniform(-half_height, half_height, (2, count))
-    alone = len(frame.spheres) == 1 and frame.plane is None
-    gated = any(sphere.material.gate_specular for sphere in frame.spheres)
     pairs = _every_kth(list(_pairs(frame)))
     spheres = _every_kth(list({id(pair.spheres[0]): pair for pair in pairs}.values()))
-    sets = [HardPoints("image", False, list(zip(x.tolist(), y.tolist(), strict=True)))]
-    sets.append(HardPoints("outlines", not alone, _pooled(points.near_silhouette, spheres, count, seed)))
-    sets.append(HardPoints("terminators", gated or not alone, _pooled(points.near_terminator, pairs, count, seed)))
-    sets.append(HardPoints("highlights", not alone, _pooled(points.near_highlight, pairs, count, seed)))
+    sets = [HardPoints("image", list(zip(x.tolist(), y.tolist(), strict=True)))]
+    sets.append(HardPoints("outlines", _pooled(points.near_silhouette, spheres, count, seed)))
+    sets.append(HardPoints("terminators", _pooled(points.near_terminator, pairs, count, seed)))
+    sets.append(HardPoints("highlights", _pooled(points.near_highlight, pairs, count, seed)))
     for edge in edge_points(frame, 1.0, count, seed):
         found = list(zip(edge.x.tolist(), edge.y.tolist(), strict=True))
-        sets.append(HardPoints(edge.where.replace("near ", "edges: "), True, found))
+        sets.append(HardPoints(edge.where.replace("near ", "edges: "), found))
     return tuple(entry for entry in sets if entry.points)
 
 

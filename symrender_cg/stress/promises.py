@@ -25,8 +25,8 @@ class Promise:
     words      as it is printed
     hits       hit or miss is never wrong
     zeros      a value is 0 exactly where the true one is
-    absolute   the largest error, times max(1, value), where no light is within NEAREST_LIGHT of a surface, n is at most
-               LARGEST_SHININESS, nothing is mirrored, and the image does not jump
+    absolute   the largest error, times max(1, value), where no light is within NEAREST_LIGHT of a surface and n is at
+               most LARGEST_SHININESS
     ulp        the largest error, in units of the last place of the level's own format
     rounded    every value is the float nearest to the true one
     """
@@ -45,8 +45,8 @@ PROMISES: Final[dict[str, Promise]] = {
     "fast": Promise("hit or miss is never wrong", hits=True),
     "single": Promise("hit or miss is never wrong", hits=True),
     "double": Promise(
-        "hit or miss is never wrong; at most 1e-15 off where no light is within 1e-3 R of a surface, n <= 1000, "
-        "nothing is mirrored and the image does not jump",
+        "hit or miss is never wrong; at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and "
+        "n <= 1000, shadows, mirrors and edges of tiles included",
         hits=True,
         absolute=1e-15,
     ),
@@ -89,7 +89,7 @@ def promise_of(level: str) -> Promise:
     return PROMISES.get(level.partition(":")[0], NOTHING)
 
 
-def broken(level: str, scene: Scene, outcome: Outcome, *, jumps: bool) -> str | None:
+def broken(level: str, scene: Scene, outcome: Outcome) -> str | None:
     """What the level promised and the outcome does not keep; None where it is kept, and for a refusal."""
     promise = promise_of(level)
     if outcome.refused is not None or promise is NOTHING:
@@ -104,15 +104,13 @@ def broken(level: str, scene: Scene, outcome: Outcome, *, jumps: bool) -> str | 
         return f"not the nearest float, {outcome.ulp:.3g} ulp off"
     if outcome.ulp > promise.ulp:
         return f"{outcome.ulp:.3g} ulp, stated {promise.ulp:g}"
-    if outcome.error > promise.absolute * max(1.0, outcome.size) and not jumps and has_absolute_bound(scene):
+    if outcome.error > promise.absolute * max(1.0, outcome.size) and has_absolute_bound(scene):
         return f"error {outcome.error:.2e}, stated {promise.absolute:g}"
     return None
 
 
 def has_absolute_bound(scene: Scene) -> bool:
     """Whether an absolute bound is stated of the scene: see Promise."""
-    if any(material.reflect > 0.0 for material in _materials(scene)) and scene.max_bounces > 0:
-        return False
     if any(material.shininess > LARGEST_SHININESS and material.specular != 0.0 for material in _materials(scene)):
         return False
     for light in scene.lights:

@@ -99,28 +99,28 @@ def run(
                 outcomes.append((case, outcome_of(case, level, true)))
                 if done is not None:
                     done(1)
-            rows.append(row_of(family.name, level, outcomes, jumps=family.jumps))
+            rows.append(row_of(family.name, level, outcomes))
     return Report(tuple(rows), seed, undecided)
 
 
 def run_scene(
-    sets: Iterable[tuple[str, bool, Scene, list[tuple[float, float]]]],
+    sets: Iterable[tuple[str, Scene, list[tuple[float, float]]]],
     levels: Iterable[str],
     *,
     seed: int = SEED,
     done: Callable[[int], None] | None = None,
 ) -> Report:
-    """A scene's hard points, (name, jumps, scene, points) a set, at each level."""
+    """A scene's hard points, (name, scene, points) a set, at each level."""
     chosen = tuple(levels)
     rows: list[Row] = []
     undecided = 0
-    for name, jumps, scene, points in sets:
+    for name, scene, points in sets:
         kept, true, left = _truth_of_points(scene, points)
         undecided += left
         cases = [Case(name, number, scene, x, y, name) for number, (x, y) in enumerate(kept)]
         for level in chosen:
             found = outcomes_at(scene, kept, level, true) if true is not None else ()
-            rows.append(row_of(name, level, list(zip(cases, found, strict=True)), jumps=jumps))
+            rows.append(row_of(name, level, list(zip(cases, found, strict=True))))
             if done is not None:
                 done(len(kept))
     return Report(tuple(rows), seed, undecided)
@@ -149,14 +149,14 @@ def _decided(scene: Scene, point: tuple[float, float]) -> bool:
     return True
 
 
-def row_of(name: str, level: str, outcomes: list[tuple[Case, Outcome]], *, jumps: bool) -> Row:
+def row_of(name: str, level: str, outcomes: list[tuple[Case, Outcome]]) -> Row:
     """The row of a level's outcomes."""
     answered = [(case, outcome) for case, outcome in outcomes if outcome.refused is None]
     failures = []
     for case, outcome in answered:
         if case.refused:
             failures.append((case, outcome, "a value of what has no image"))
-        elif case.scene is not None and (why := broken(level, case.scene, outcome, jumps=jumps)):
+        elif case.scene is not None and (why := broken(level, case.scene, outcome)):
             failures.append((case, outcome, why))
     first = ""
     if failures:

@@ -1,15 +1,15 @@
-"""`python -m benchmarks scaling`: the time of an image against the number of spheres, beside POV-Ray and Mitsuba.
+"""`python -m benchmarks scaling spheres`: an image against the number of spheres, beside POV-Ray and Mitsuba.
 
-Comes in: counts of spheres, a size, rounds. Goes out: Report and its table. Scenes: `random_spheres(count, seed)`, with
-hard shadows and without. Contestants take turns in every round; ours keep their output array, the plan and the
-kernel; Mitsuba keeps its scene and kernels; of POV-Ray it is the trace time that its own statistics state (to 1 ms).
+Comes in: counts of spheres, a size, rounds. Goes out: SpheresReport and its table. Scenes:
+`random_spheres(count, seed)`, with hard shadows and without. Contestants take turns in every round; ours keep their
+output array, the plan and the kernel; Mitsuba keeps its scene and kernels; of POV-Ray it is the trace time that its own
+statistics state (to 1 ms).
 `planning` is apart: the first image of a scene with other spheres, its kernel compiled already, less a warm one.
 Never done here: a comparison of pixels finer than counting those more than an 8-bit level apart.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -21,7 +21,16 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import mitsuba, povray
-from benchmarks.machine import Machine, Spread, cores, spread, take_turns, this_machine
+from benchmarks.machine import (
+    Machine,
+    Spread,
+    cores,
+    milliseconds,
+    spread,
+    take_turns,
+    this_machine,
+    warm_sample,
+)
 from symrender_cg import Scene, render_image
 from symrender_cg.errors import OutsidePlanError
 from symrender_cg.scene.random import random_spheres
@@ -31,9 +40,6 @@ QUICK_COUNTS: Final = (1, 10, 100)
 ACCURACIES: Final = ("double", "single")
 PLANNED: Final = 3
 """Scenes that planning is timed on."""
-
-SHORTEST_SAMPLE: Final = 0.01
-"""Seconds: what is faster is called several times for one sample."""
 
 LEVEL: Final = 1.0 / 255.0
 OTHER_PICTURE: Final = 0.01
@@ -68,8 +74,8 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
-    """What `scaling` measured."""
+class SpheresReport:
+    """What `scaling spheres` measured."""
 
     machine: Machine
     peers: tuple[str, ...]
@@ -130,7 +136,9 @@ def ours_name(accuracy: str, threads: int) -> str:
     return f"{accuracy} {threads}t"
 
 
-def measure_scaling(counts: Sequence[int], size: int, rounds: int, seed: int, told: Callable[[str], None]) -> Report:
+def measure_spheres(
+    counts: Sequence[int], size: int, rounds: int, seed: int, told: Callable[[str], None]
+) -> SpheresReport:
     """Each count with shadows and without; told(text) says what is going on."""
     program, lacking = povray.find(), mitsuba.missing()
     absent = [] if program else [f"POV-Ray is not installed and left out; {povray.INSTALL}"]
@@ -138,7 +146,7 @@ def measure_scaling(counts: Sequence[int], size: int, rounds: int, seed: int, to
     peers = ([povray.version(program)] if program else []) + ([] if lacking else [mitsuba.version()])
     cases = [(count, shadows) for count in counts for shadows in (True, False)]
     rows = [_row(count, shadows, size, rounds, seed, program, not lacking, told) for count, shadows in cases]
-    return Report(this_machine(), tuple(peers), tuple(absent), size, rounds, seed, cores(), tuple(rows))
+    return SpheresReport(this_machine(), tuple(peers), tuple(absent), size, rounds, seed, cores(), tuple(rows))
 
 
 def _row(
@@ -195,30 +203,9 @@ def _planning(count: int, seed: int, shadows: bool, size: int) -> Spread:
     for other in range(seed + 1, seed + 1 + PLANNED):
         scene = random_spheres(count, other, shadows=shadows)
         draw = partial(render_image, scene, size, size, threads=1, clip=False)
-        first, warm = _milliseconds(draw), min(_milliseconds(draw) for _ in range(3))
+        first, warm = milliseconds(draw), min(milliseconds(draw) for _ in range(3))
         samples.append(max(first - warm, 0.0))
     return spread(samples)
-
-
-def _milliseconds(call: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    call()
-    return 1e3 * (time.perf_counter() - start)
-
-
-def warm_sample(draw: Callable[[], object]) -> Callable[[], float]:
-    """A call that times enough images for one sample, after one that is not timed, and returns milliseconds."""
-    draw()
-    calls = max(1, round(SHORTEST_SAMPLE / max(1e-3 * _milliseconds(draw), 1e-6)))
-
-    def sample() -> float:
-        draw()
-        start = time.perf_counter()
-        for _ in range(calls):
-            draw()
-        return 1e3 * (time.perf_counter() - start) / calls
-
-    return sample
 
 
 def _trace_milliseconds(trace: Callable[[], povray.Drawn]) -> float:

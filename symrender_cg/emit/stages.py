@@ -1,0 +1,160 @@
+"""The stages of a pixel as C functions: each takes what it needs from a block of values, and leaves what others need.
+
+Comes in: a KernelProgram that fission.py has cut, and where the names of the frame and the row live. Goes out: for each
+stage its parameters, its lines and what it leaves, for templates/kernel.c.j2 to place. Never done here: a cut.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from symrender_cg.emit.bodies import INDENT, WIDTH, body, counts, declared
+from symrender_cg.emit.printer import C_TYPES
+from symrender_cg.lower.fission import crossing
+from symrender_cg.lower.formats import WIDE
+from symrender_cg.lower.nodes import Select, walk
+from symrender_cg.lower.program import KernelProgram, Shortcut, Step
+from symrender_cg.lower.symmetry import parities
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One stage in C.
+
+    mirrored   it is the same for x and -x
+    sided      it reads what is odd in x, with the sign of `side`
+    takes      which of x, row and frame it reads
+    replaced   the shortcut of the program computes what it leaves, where it may
+    """
+
+    number: int
+    mirrored: bool
+    sided: bool
+    takes: frozenset[str]
+    told: tuple[str, ...]
+    lines: tuple[str, ...]
+    replaced: bool = False
+
+    def parameters(self, real: str) -> str:
+        """The parameters of the C function."""
+        kinds = {"x": "double x", "side": f"{real} side", "row": "const row *r", "frame": "const frame *f"}
+        return ", ".join([*(kinds[name] for name in kinds if name in self._named), "block *b", "int i"])
+
+    def call(self, **given: str) -> str:
+        """A call of it, its arguments by the words of `takes`, `side` and `block`."""
+        order = ("x", "side", "row", "frame")
+        arguments = [*(given[name] for name in order if name in self._named), given["block"], "i"]
+        return f"stage_{self.number}({', '.join(arguments)})"
+
+    @property
+    def _named(self) -> frozenset[str]:
+        return self.takes | ({"side"} if self.sided else set())
+
+
+@dataclass(frozen=True, slots=True)
+class Stages:
+    """All stages of a kernel, and the arrays of the block between them, a type at a time."""
+
+    each: tuple[Stage, ...]
+    arrays: tuple[str, ...]
+    shortcut: Shortcut | None = None
+
+    def shortcut_call(self, block: str, frame: str, count: str) -> str:
+        """The call that computes a step for a block."""
+        assert self.shortcut is not None, "there is one"
+        cut = self.shortcut
+        held = ", ".join(f"{block}{name}" for name in (cut.source, cut.room, cut.result))
+        return f"{cut.function}({held}, {frame}{cut.when}, {count})"
+
+    @property
+    def mirrored(self) -> tuple[Stage, ...]:
+        """Those that are the same for x and -x."""
+        return tuple(stage for stage in self.each if stage.mirrored)
+
+    @property
+    def others(self) -> tuple[Stage, ...]:
+        """Those that are not."""
+        return tuple(stage for stage in self.each if not stage.mirrored)
+
+    @property
+    def sided(self) -> bool:
+        """Whether any of them reads the side."""
+        return any(stage.sided for stage in self.each)
+
+    def reads(self, stages: Sequence[Stage], name: str) -> bool:
+        """Whether one of those stages takes the row, or the frame."""
+        return any(name in stage.takes for stage in stages)
+
+
+def stages_of(program: KernelProgram, frame: Mapping[str, str], places: Mapping[str, str]) -> Stages | None:
+    """The stages of a program, None where it has none; `frame` and `places` as for KernelPrinter, for all but a pixel's
+    own steps."""
+    if not program.stages:
+        return None
+    parity = parities(program) if program.mirrored else {}
+    later = {used for stage in program.stages[1:] for name in stage for used in program[name].uses()}
+    leaves = list(crossing(program))
+    leaves[-1] = (*leaves[-1], program.result)
+    if program.shortcut is not None:
+        for number, names in enumerate(program.stages):
+            if program.shortcut.source in names and program.shortcut.source not in leaves[number]:
+                leaves[number] = (*leaves[number], program.shortcut.source)
+    if "x" in later:
+        leaves[0] = ("x", *leaves[0])
+    formats = {step.name: step.format for step in program.steps} | {"x": "float64"}
+    carried = [name for names in leaves for name in names]
+    assert not any(formats[name] in WIDE for name in carried), "what crosses is one number"
+    done: set[str] = set()
+    found: list[Stage] = []
+    for number, (names, left) in enumerate(zip(program.stages, leaves, strict=True), 1):
+        steps = tuple(program[name] for name in names)
+        mirrored = number <= program.mirrored
+        found.append(_stage(number, steps, left, done, {} if mirrored else parity, places, formats, frame, mirrored))
+        done |= set(left)
+    arrays = declared((str(C_TYPES[formats[name]].name), f"{name}[POINTS]") for name in dict.fromkeys(carried))
+    replaced = program.shortcut.stages if program.shortcut else ()
+    each = tuple(replace(stage, replaced=stage.number - 1 in replaced) for stage in found)
+    return Stages(each, tuple(arrays), program.shortcut)
+
+
+def _chosen(step: Step) -> set[str]:
+    """Names that a step chooses from."""
+    selects = [node for node in walk(step.value) if isinstance(node, Select)]
+    return {branch.name for node in selects for branch in node.args[1:] if branch.is_Symbol}
+
+
+def _stage(
+    number: int,
+    steps: Sequence[Step],
+    left: Sequence[str],
+    done: set[str],
+    parity: Mapping[str, str],
+    places: Mapping[str, str],
+    formats: Mapping[str, str],
+    frame: Mapping[str, str],
+    mirrored: bool,
+) -> Stage:
+    own = {step.name for step in steps}
+    uses = {name for step in steps for name in step.uses()} - own
+    from_block = sorted(uses & done, key=list(formats).index)
+    odd = [name for name in from_block if parity.get(name) == "odd"]
+    here = dict(places) | {name: "b->{}[i]" for name in from_block if name not in odd} | dict.fromkeys(own, "")
+    lines = [f"{INDENT}const {C_TYPES[formats[name]].name} {name} = side * b->{name}[i];" for name in odd]
+    chosen = sorted({name for step in steps for name in _chosen(step)} - own)
+    read = {name: f"b->{name}[i]" for name in chosen if name in from_block and name not in odd}
+    read |= {name: f"f->{name}" for name in chosen if frame.get(name) == "f->" and name in formats}
+    here |= dict.fromkeys(read, "")  # read before they are chosen from: a read under a condition stops vectorisation
+    lines += [f"{INDENT}const {C_TYPES[formats[name]].name} {name} = {place};" for name, place in read.items()]
+    lines += [""] if lines else []
+    lines += body(steps, here | dict.fromkeys(odd, ""))
+    lines.append("")
+    lines += [f"{INDENT}b->{name}[i] = {name};" for name in left]
+    takes = {"x"} if "x" in uses - done else set()
+    takes |= {"row"} if any(place == "r->" for name, place in places.items() if name in uses) else set()
+    takes |= {"frame"} if any(place == "f->" for name, place in frame.items() if name in uses) else set()
+    sections = ", ".join(dict.fromkeys(step.section for step in steps))
+    told = f"Stage {number}{', the same for x and -x' if mirrored else ''}: {sections} [{counts(steps)}]."
+    told_lines = textwrap.wrap(f"{told} Leaves {', '.join(left)}.", WIDTH - 6, break_long_words=False)
+    return Stage(number, mirrored, bool(odd), frozenset(takes), tuple(told_lines), tuple(lines))

@@ -1,0 +1,152 @@
+"""Fission: the steps of a pixel cut into stages, each to become a short loop over a block of pixels.
+
+Comes in: a frozen, pruned and arranged KernelProgram. Goes out: the same one with its `stages`. Never done here: a
+change of a value, or of what is computed; that is why kernels with and without stages give the same bits.
+
+Why it pays: a processor looks some hundred operations ahead. The steps of a pixel wait for one another, through square
+roots, divisions and two polynomials, for about 250 cycles, and one vector of pixels fills its view. In a loop of thirty
+operations it sees several vectors at once, and while one waits another goes on. What one stage leaves for a later one
+crosses in an array of a block, which stays in the first level cache.
+
+Where to cut: where the cycles of the stages and of the values that cross, by a model of four numbers, sum to the least
+(dynamic programming over the places between two steps).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from symrender_cg.lower.nodes import Call, Cast, Quotient, Root, walk
+from symrender_cg.lower.program import KernelProgram, Shortcut, Step, operations_of
+from symrender_cg.lower.symmetry import parities
+
+ISSUED, IN_VIEW, CROSSING, LOOP = 3.0, 100.0, 1.0, 1.0
+"""Operations issued a cycle; operations at which a stage takes as many cycles, by waiting; cycles of a value that
+crosses, and of a loop. Fitted to stages measured on AMD Zen 5. What matters: short loops win, and a cut has a price."""
+
+_SLOW: Mapping[type, int] = {Quotient: 4, Root: 7}
+"""Divisions and square roots keep their unit busy for so many cycles."""
+
+_CALLS: Mapping[str, int] = {
+    "square": 1,
+    **dict.fromkeys(("log2_of_lobe", "log2_of_lobef"), 36),
+    **dict.fromkeys(("power_of_lobe", "power_of_lobef"), 31),
+    "fast_log2_of_lobef": 24,
+    "fast_log2_of_squaref": 20,
+    "fast_power_of_lobef": 20,
+}
+_OTHER_CALL = 60
+"""A whole power."""
+
+_SIMPLE = ("add", "mul", "max", "select")
+
+
+def cut(program: KernelProgram, *, fission: bool, symmetry: bool) -> KernelProgram:
+    """The program with the steps of its pixels in stages; the first `mirrored` of them are the same for x and -x.
+
+    ray, normal, light, diffuse, specular  ->  (ray, normal), (what x and -x share), (light, diffuse), (log2), (2^y)
+    """
+    pixel = _leading_to(program.at("pixel"), {program.result})
+    parity = parities(program) if symmetry else {}
+    shared = _leading_to(pixel, parity) if parity else ()
+    names = {step.name for step in shared}
+    rest = tuple(step for step in pixel if step.name not in names)
+    needed = {name for step in rest for name in step.uses()} | {program.result}
+    first = _cut(shared, needed) if fission else tuple(tuple(s.name for s in part) for part in (shared,) if part)
+    parts = _around(rest, program.shortcut)
+    last = tuple(stage for part in parts for stage in _stages(part, rest, program.result, fission))
+    stages = (*first, *last)
+    if program.shortcut is None:
+        return replace(program, stages=stages, mirrored=len(first))
+    halves = {program.shortcut.room, program.shortcut.result}
+    where = tuple(number for number, names in enumerate(stages) if set(names) <= halves)
+    assert len(where) == 2, "each half of a power is a stage of its own"
+    return replace(program, stages=stages, mirrored=len(first), shortcut=replace(program.shortcut, stages=where))
+
+
+def _around(steps: tuple[Step, ...], shortcut: Shortcut | None) -> tuple[tuple[Step, ...], ...]:
+    """The steps before, of and after what a shortcut replaces, which stands together: both halves of a power do."""
+    if shortcut is None:
+        return (steps,) if steps else ()
+    names = [step.name for step in steps]
+    begin, end = names.index(shortcut.room), names.index(shortcut.result) + 1
+    assert end == begin + 2, "the halves of a power stand together"
+    return tuple(part for part in (steps[:begin], steps[begin:end], steps[end:]) if part)
+
+
+def _stages(part: tuple[Step, ...], steps: tuple[Step, ...], result: str, fission: bool) -> tuple[tuple[str, ...], ...]:
+    """The stages of one part of the steps; what the steps after it use is kept."""
+    after = steps[steps.index(part[-1]) + 1 :]
+    needed = {name for step in after for name in step.uses()} | {result}
+    return _cut(part, needed) if fission else (tuple(step.name for step in part),)
+
+
+def cycles(stage: int) -> float:
+    """About how many cycles a vector of pixels takes in a loop of that weight.
+
+    Operations are issued some three at a time; how long they wait for one another grows with their square.
+    """
+    return LOOP + max(stage / ISSUED, stage * stage / IN_VIEW)
+
+
+def weight(step: Step, *, wide: bool = False) -> int:
+    """What a step is worth, in simple operations; twice that where it is of a `wide` format among narrower ones."""
+    counted = operations_of(step)
+    total = sum(counted[kind] for kind in _SIMPLE)
+    for node in walk(step.value):
+        total += 1 if isinstance(node, Cast) else _SLOW.get(type(node), 0)
+        if isinstance(node, Call):
+            total += _CALLS.get(node.function, _OTHER_CALL)
+    return 2 * total if wide else total
+
+
+def crossing(program: KernelProgram) -> tuple[tuple[str, ...], ...]:
+    """For each stage the names that it leaves for later ones, in their order."""
+    later: set[str] = set()
+    found: list[tuple[str, ...]] = []
+    for stage in reversed(program.stages):
+        found.append(tuple(name for name in stage if name in later))
+        later |= {used for name in stage for used in program[name].uses()}
+    return tuple(reversed(found))
+
+
+def _leading_to(steps: Sequence[Step], names: Iterable[str]) -> tuple[Step, ...]:
+    needed = set(names)
+    kept: list[Step] = []
+    for step in reversed(steps):
+        if step.name in needed:
+            kept.append(step)
+            needed |= step.uses()
+    return tuple(reversed(kept))
+
+
+def _cut(steps: Sequence[Step], needed: set[str]) -> tuple[tuple[str, ...], ...]:
+    """The cheapest cuts."""
+    if not steps:
+        return ()
+    names = [step.name for step in steps]
+    last_use = {name: len(steps) if name in needed else i for i, name in enumerate(names)}
+    for i, step in enumerate(steps):
+        for name in step.uses() & last_use.keys():
+            last_use[name] = max(last_use[name], i)
+    narrow = any(step.format == "float32" for step in steps)
+    weights = [weight(step, wide=narrow and step.format != "float32") for step in steps]
+
+    def crosses(at: int) -> int:
+        return sum(1 for i, name in enumerate(names[:at]) if last_use[name] >= at)
+
+    best: list[tuple[float, int]] = [(0.0, 0)]  # cycles of the stages so far, where the last one begins
+    for end in range(1, len(steps) + 1):
+        options = []
+        for begin in range(end):
+            carried = CROSSING * crosses(begin) if begin else 0.0
+            options.append((best[begin][0] + carried + cycles(sum(weights[begin:end])), begin))
+        best.append(min(options))
+    stages: list[tuple[str, ...]] = []
+    end = len(steps)
+    while end:
+        begin = best[end][1]
+        stages.append(tuple(names[begin:end]))
+        end = begin
+    return tuple(reversed(stages))
