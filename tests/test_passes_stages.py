@@ -258,7 +258,7 @@ def test_each_pass_can_be_left_out_and_the_promise_stands(level: str, off: tuple
 
 
 @pytest.mark.parametrize("level", ["single", "double"])
-@pytest.mark.parametrize("shininess", [2.0, 4.0, 6.0, 10.0, 32.0, 100.0])
+@pytest.mark.parametrize("shininess", [8.0, 10.0, 32.0, 100.0])
 def test_an_even_whole_exponent_takes_the_shortcut_and_keeps_the_promise(level: str, shininess: float) -> None:
     """The same kernel with and without it."""
     scene = Scene.chapter1(shininess=shininess)
@@ -271,7 +271,7 @@ def test_an_even_whole_exponent_takes_the_shortcut_and_keeps_the_promise(level: 
 
 
 @pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("shininess", [0.0, 1.0, 2.5, 37.5, 33.0, 1026.0, 1e300])
+@pytest.mark.parametrize("shininess", [0.0, 1.0, 2.0, 2.5, 6.0, 37.5, 33.0, 1026.0, 1e300])
 def test_other_exponents_take_the_way_of_all(level: str, shininess: float) -> None:
     scene = Scene.chapter1(shininess=shininess)
     image, _ = image_and_points(scene, level, 40, 33)

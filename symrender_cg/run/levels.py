@@ -60,8 +60,9 @@ def hands_over(scene: Scene) -> bool:
     """Whether plain float64 may be off by more than 1e-15 in a scene of one sphere under one light.
 
     With d the distance of the light from the surface in radii, the largest errors measured over 2,400 points for each
-    of 90 pairs (d, n) stay below I_L (3 k_d / d + k_s (1 + 2.9 sqrt(n)) (1 + 1 / (4 d))) roundoffs, and 2 for each unit
-    of intensity by which the scene may be brighter than Chapter 1's 1.3.
+    of 90 pairs (d, n), and over 1,000 points of 1,054 random scenes, stay below I_L (3 k_d / d + k_s max(13, 1 + 2.9
+    sqrt(n)) (1 + 1 / (4 d))) roundoffs, and 2 for each unit of intensity by which the scene may be brighter than
+    Chapter 1's 1.3; or below 9, where that is less.
     """
     found = planned(scene)
     if found.arrangement is not None:
@@ -76,7 +77,8 @@ def hands_over(scene: Scene) -> bool:
     if distance == 0.0:
         return True
     diffuse = 3.0 * numbers["k_diffuse"] / distance
-    specular = k_specular * (1.0 + 2.9 * math.sqrt(shininess)) * (1.0 + 0.25 / distance)
+    slope = max(13.0, 1.0 + 2.9 * math.sqrt(shininess)) if shininess > 0.0 else 1.0
+    specular = k_specular * slope * (1.0 + 0.25 / distance)
     intensity = numbers["light_intensity"]
     brightest = numbers["k_ambient"] + intensity * (numbers["k_diffuse"] + k_specular)
     return intensity * (diffuse + specular) + 2.0 * max(0.0, brightest - 1.3) > MOST_ROUNDOFFS
