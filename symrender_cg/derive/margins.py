@@ -136,8 +136,8 @@ def _echo_plane(_: sp.Expr) -> tuple[Definition, ...]:
 
 
 def _aside(scale: sp.Expr) -> sp.Expr:
-    """What a mirrored ray is aside where it meets the next surface: the old point's drift, in the new unit, and for each
-    unit of the way twice its turn. Three quarters of that is what was seen at most."""
+    """What a mirrored ray is aside where it meets the next surface: the old point's drift, in the new unit, and twice
+    its turn for each unit of the way. Three quarters of that is what was seen at most."""
     return sp.Rational(3, 4) * (S("drift") * scale + 2 * S("turn") * S("travelled"))
 
 
