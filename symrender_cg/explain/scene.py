@@ -27,6 +27,7 @@ MEANINGS: Final = {
     "reach": "from a point to a lamp",
     "matte": "n.l of a point",
     "glossy": "n.l and the highlight of a point",
+    "gate": "how sure it is that a surface faces the light, which a gated highlight rests on",
     "fading": "how a point light fades with its distance",
     "shadow": "whether a sphere stands between a point and a lamp",
     "echo": "a mirrored ray and a sphere",
