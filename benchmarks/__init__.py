@@ -11,8 +11,10 @@ nobody here wrote draw the same (`agreement`), and whether random scenes are rig
     python -m benchmarks scaling [spheres] [lights] [sizes] [compile] [--size 512] [--rounds 9] [--quick] [--json]
     python -m benchmarks levels [SCENE ...] [--size 256] [--rounds 9] [--points 2000] [--json]
     python -m benchmarks scenes [SCENE ...] [--size 512] [--rounds 9] [--json]
+    python -m benchmarks hand-over [--scenes 2400] [--points 1000] [--json]
     python -m benchmarks.calls
     python -m benchmarks.processors
+    python -m benchmarks promises [--count 500] [--others 160] [--json]
     python -m benchmarks random-scenes [--count 2000] [--width 24] [--height 20] [--jobs N] [--json]
 
 Other renderers are POV-Ray 3.7 (Debian: apt-get install povray) and Mitsuba 3 (pip install mitsuba, and libLLVM:

@@ -12,7 +12,7 @@ from pathlib import Path
 from rich.console import Console
 
 import benchmarks
-from benchmarks import agreement, levels, random_scenes, roofline, scaling, scenes, speed, start
+from benchmarks import agreement, hand_over, levels, promises, random_scenes, roofline, scaling, scenes, speed, start
 from benchmarks.peers import chart, contest
 from benchmarks.peers import report as peers
 from symrender_cg.errors import SymrenderError
@@ -44,6 +44,8 @@ Report = (
     | random_scenes.Report
     | scenes.Report
     | levels.Report
+    | hand_over.Report
+    | promises.Report
     | peers.Report
     | roofline.Report
 )
@@ -60,9 +62,13 @@ def _measured(options: argparse.Namespace, told: Callable[[str], None]) -> Repor
         return random_scenes.measure_random_scenes(options.count, options.seed, size, options.jobs, told)
     if options.command == "scenes":
         return scenes.measure_scenes(options.scenes, options.size, options.rounds, options.seed, told)
+    if options.command == "hand-over":
+        return hand_over.measure_hand_over(options.scenes, options.points, options.seed, told)
     if options.command == "levels":
         size, rounds, seed = options.size, options.rounds, options.seed
         return levels.measure_levels(options.scenes, size, rounds, options.points, seed, told)
+    if options.command == "promises":
+        return promises.measure_promises(options.count, options.others, options.seed, told)
     if options.command == "scaling":
         return scaling.measure_all(_scaling_plan(options), told)
     if options.command == "peers":
@@ -154,6 +160,12 @@ def _parser() -> argparse.ArgumentParser:
     truth.add_argument("--width", type=_count, default=24, help="pixels of a row (24)")
     truth.add_argument("--height", type=_count, default=20, help="rows of an image (20)")
     truth.add_argument("--jobs", type=_count, help="processes (one for each processor)")
+    kept = commands.add_parser("promises", help="bounds and requests on scenes that nothing was fitted to; minutes")
+    kept.add_argument("--count", type=_count, default=500, help="scenes whose bounds are compared (500)")
+    kept.add_argument("--others", type=_count, default=160, help="other scenes, of ten requests each (160)")
+    rule = commands.add_parser("hand-over", help="errors of double's kernel of one sphere beside the rule's bound")
+    rule.add_argument("--scenes", type=_count, default=2400, help="random scenes (2400)")
+    rule.add_argument("--points", type=_count, default=1000, help="hard points of each (1000)")
     rivals = commands.add_parser("peers", help="ns a pixel and errors beside numba, JAX, Dr.Jit, Halide and others")
     rivals.add_argument("--quick", action="store_true", help="512 x 512, one thread, 5 rounds: under two minutes")
     rivals.add_argument("--size", type=_count, help="side of the image (1024)")
@@ -165,7 +177,7 @@ def _parser() -> argparse.ArgumentParser:
     roof.add_argument("--sizes", type=_count, nargs="+", default=[128, 512, 4096], help="sides (128 512 4096)")
     roof.add_argument("--rounds", type=_count, default=9, help="samples of each time (9)")
     roof.add_argument("--plot", type=Path, metavar="FILE", help="chart of the roofline, .png or .svg")
-    for command in (fast, first, others, many, effects, costs, truth, rivals, roof):
+    for command in (fast, first, others, many, effects, costs, truth, kept, rule, rivals, roof):
         command.add_argument("--seed", type=int, default=1, help="seed of the order of turns and of the pixels (1)")
         command.add_argument("--json", action="store_true", help="print JSON, not tables")
     return parser

@@ -1,8 +1,9 @@
 """`python -m benchmarks.calls`: what a call costs beyond its kernel, what a second thread brings, what a batch saves.
 
-Comes in: rounds, a seed. Goes out: three tables. Contestants take turns, in another order every round; a ratio is the
-median of the ratios within a round. Beside the gain of two threads stands what two threads of this machine can gain at
-all: each draws an image of its own, and neither waits for the other.
+Comes in: rounds, a seed. Goes out: tables. Contestants take turns, in another order every round; a ratio is the
+median of the ratios within a round. Beside the gain of two threads stands what threads of Python would gain in place of
+the pool in C, and what two threads of this machine can gain at all: each draws an image of its own, and neither waits
+for the other.
 """
 
 from __future__ import annotations
@@ -10,21 +11,39 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import Spread, spread, take_turns, this_machine, warm_sample
-from symrender_cg import Scene, render_batch, render_image
+from benchmarks.machine import Spread, milliseconds, spread, take_turns, this_machine, warm_sample
+from symrender_cg import PointLight, Scene, render_batch, render_image
 from symrender_cg.pipeline import draw
+from symrender_cg.run.batch import SECONDS_BETWEEN
+from symrender_cg.run.chunks import Asked, Waiting, make_chunk
+from symrender_cg.run.parameters import parameter_sets
+from symrender_cg.run.threads import over_rows
+
+Floats = NDArray[np.float64]
 
 SCENES = ("chapter1", "two_spheres", "hundred")
 SIDES = (256, 512, 1024, 2048)
 SETS = 500
+PAUSE = 0.01
+"""Seconds between calls that come rarely."""
+
+BATCHED = ("two_spheres", "shadow", "hundred")
+LOOPED = 20
+"""Images of a loop over render_image that are measured."""
+
+PAUSES = 10
+"""Such calls a sample."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +76,49 @@ def overheads(rounds: int, seed: int) -> list[Row]:
 
 
 def gains(rounds: int, seed: int) -> list[Row]:
-    """Milliseconds of an image on one thread and on two, their ratio, and the ratio that the machine can give."""
+    """Milliseconds of an image on one thread and on two, their ratio, that of threads of Python in place of the pool,
+    and the ratio that the machine can give."""
     rows = []
     for name in SCENES:
         scene = Scene.builtin(name)
         for side in SIDES:
             images = [render_image(scene, side, side, threads=2) for _ in range(2)]
+            write = draw(scene, size=(side, side), clip=True).onto(images[0])
+
+            def python(write: Callable[[int, int], object] = write, side: int = side) -> None:
+                over_rows(lambda begin, end: write(begin, end), side, 2, width=side)
+
             calls = {
+                "python": warm_sample(python),
                 "one": warm_sample(lambda s=scene, n=side, o=images[0]: render_image(s, n, n, threads=1, out=o)),  # type: ignore[misc]
                 "two": warm_sample(lambda s=scene, n=side, o=images[0]: render_image(s, n, n, threads=2, out=o)),  # type: ignore[misc]
                 "own": lambda s=scene, n=side, o=images: _two_at_once(s, n, o),  # type: ignore[misc]
             }
             found = {key: np.array(values) for key, values in take_turns(calls, rounds, seed, lambda _: None).items()}
-            numbers = found["one"], found["two"], found["one"] / found["two"], 2.0 * found["one"] / found["own"]
+            gained = (found["one"] / found["two"], found["one"] / found["python"], 2.0 * found["one"] / found["own"])
+            numbers = found["one"], found["two"], *gained
+            rows.append(Row(f"{name} {side} x {side}", tuple(spread(v.tolist()) for v in numbers)))
+    return rows
+
+
+def pauses(rounds: int, seed: int) -> list[Row]:
+    """The same of calls that come rarely, when the other thread sleeps: medians of calls after pauses."""
+    rows = []
+    for name in SCENES[:2]:
+        scene = Scene.builtin(name)
+        for side in SIDES:
+            image = render_image(scene, side, side, threads=2)
+
+            def after_pauses(threads: int, scene: Scene = scene, side: int = side, image: np.ndarray = image) -> float:
+                taken = []
+                for _ in range(PAUSES):
+                    time.sleep(PAUSE)
+                    taken.append(milliseconds(lambda: render_image(scene, side, side, threads=threads, out=image)))
+                return float(np.median(taken))
+
+            calls: dict[str, Callable[[], float]] = {"one": partial(after_pauses, 1), "two": partial(after_pauses, 2)}
+            found = {key: np.array(values) for key, values in take_turns(calls, rounds, seed, lambda _: None).items()}
+            numbers = found["one"], found["two"], found["one"] / found["two"]
             rows.append(Row(f"{name} {side} x {side}", tuple(spread(v.tolist()) for v in numbers)))
     return rows
 
@@ -116,20 +165,124 @@ def batches(rounds: int, seed: int) -> list[Row]:
     return rows
 
 
+def scene_batches(rounds: int, seed: int) -> list[Row]:
+    """Microseconds an image of render_batch of scenes of many surfaces on one thread, of which to make its sets ready,
+    of render_image in a loop, and their ratio; a light or a sphere moves, to places that were never planned before."""
+    draws = np.random.default_rng(seed)
+    rows = []
+    for name in BATCHED:
+        scene = Scene.builtin(name)
+        for what, far in (("lights.0.position", 0.25), ("spheres.0.center", 0.02)):
+            start = scene.lights[0] if what.startswith("lights") else scene.spheres[0]
+            place = np.array(start.position if isinstance(start, PointLight) else start.center)  # type: ignore[union-attr]
+            for side, count in ((64, 200), (256, 40)):
+                images = np.empty((count, side, side))
+
+                def sets(place: Floats = place, far: float = far, count: int = count) -> Floats:
+                    return place + draws.uniform(-far, far, (count, 3))
+
+                def batch(
+                    scene: Scene = scene, what: str = what, images: Floats = images, sets: Callable[[], Floats] = sets
+                ) -> float:
+                    places, start = sets(), time.perf_counter()
+                    render_batch(scene, {what: places}, *images.shape[1:], out=images, threads=1)
+                    return 1e6 * (time.perf_counter() - start) / len(images)
+
+                def ready(
+                    scene: Scene = scene, what: str = what, images: Floats = images, sets: Callable[[], Floats] = sets
+                ) -> float:
+                    found = parameter_sets(scene, {what: sets()})
+                    asked = Asked(found, images.shape[2], images.shape[1], "double", None, True, 1, False, None)
+                    waiting, start = Waiting(deque(range(found.count))), time.perf_counter()
+                    while waiting.sets:
+                        make_chunk(asked, waiting, SECONDS_BETWEEN)
+                    return 1e6 * (time.perf_counter() - start) / found.count
+
+                def loop(
+                    scene: Scene = scene, what: str = what, images: Floats = images, sets: Callable[[], Floats] = sets
+                ) -> float:
+                    some = parameter_sets(scene, {what: sets()[:LOOPED]})
+                    start = time.perf_counter()
+                    for index in range(some.count):
+                        render_image(some.scene(index), *images.shape[1:], out=images[index], threads=1)
+                    return 1e6 * (time.perf_counter() - start) / some.count
+
+                drawn: dict[str, Callable[[], float]] = {"batch": batch, "ready": ready, "loop": loop}
+                for call in drawn.values():
+                    call()
+                found = {key: np.array(v) for key, v in take_turns(drawn, rounds, seed, lambda _: None).items()}
+                numbers = found["batch"], found["ready"], found["loop"], found["loop"] / found["batch"]
+                title = f"{name}, {'a light' if what.startswith('lights') else 'a sphere'} moves, {side} x {side}"
+                rows.append(Row(title, tuple(spread(v.tolist()) for v in numbers)))
+    return rows
+
+
+def proved_batches(rounds: int, seed: int) -> list[Row]:
+    """The same of levels that prove their values: Chapter 1's sphere under a light that moves, and two spheres."""
+    draws = np.random.default_rng(seed)
+    rows = []
+    for name, accuracy, count in (
+        ("chapter1", "stable", 100),
+        ("chapter1", "certified", 100),
+        ("two_spheres", "stable", 10),
+    ):
+        scene = Scene.builtin(name)
+        light = scene.lights[0]
+        assert isinstance(light, PointLight), "a scene of the benchmark"
+        images = np.empty((count, 64, 64))
+
+        def sets(count: int = count, place: tuple[float, float, float] = light.position) -> Floats:
+            return np.array(place) + draws.uniform(-0.25, 0.25, (count, 3))
+
+        def batch(
+            scene: Scene = scene, accuracy: str = accuracy, images: Floats = images, sets: Callable[[], Floats] = sets
+        ) -> float:
+            places, start = sets(), time.perf_counter()
+            render_batch(scene, {"lights.0.position": places}, 64, 64, accuracy=accuracy, out=images, threads=1)
+            return 1e6 * (time.perf_counter() - start) / len(images)
+
+        def loop(
+            scene: Scene = scene, accuracy: str = accuracy, images: Floats = images, sets: Callable[[], Floats] = sets
+        ) -> float:
+            some = parameter_sets(scene, {"lights.0.position": sets()})
+            start = time.perf_counter()
+            for index in range(some.count):
+                render_image(some.scene(index), 64, 64, accuracy=accuracy, out=images[index], threads=1)
+            return 1e6 * (time.perf_counter() - start) / some.count
+
+        drawn: dict[str, Callable[[], float]] = {"batch": batch, "loop": loop}
+        for call in drawn.values():
+            call()
+        found = {key: np.array(values) for key, values in take_turns(drawn, rounds, seed, lambda _: None).items()}
+        numbers = found["batch"], found["loop"], found["loop"] / found["batch"]
+        rows.append(Row(f"{name}, {accuracy}, 64 x 64", tuple(spread(v.tolist()) for v in numbers)))
+    return rows
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Measures and prints."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.calls", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="samples of each contestant (15)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the order of turns (1)")
+    parser.add_argument("--only", default="", help="the tables whose title has this text (all)")
     options = parser.parse_args(argv)
     console = Console(width=140)
     console.print(this_machine().line(), highlight=False)
     tables = (
         ("a warm call, us", ("call", "kernel alone", "beyond the kernel"), overheads),
-        ("a second thread, ms", ("one thread", "two threads", "gain", "gain of two images at once"), gains),
+        ("a second thread, ms", ("one thread", "two threads", "gain", "of Python's threads", "of two images"), gains),
+        ("a second thread that slept, ms", ("one thread", "two threads", "gain"), pauses),
         ("a batch, us an image", ("render_batch", "render_image in a loop", "ratio"), batches),
+        (
+            "a batch of scenes, us an image",
+            ("render_batch", "of that to make ready", "render_image in a loop", "ratio"),
+            scene_batches,
+        ),
+        ("a batch proved, us an image", ("render_batch", "render_image in a loop", "ratio"), proved_batches),
     )
     for title, heads, measured in tables:
+        if options.only not in title:
+            continue
         table = Table(title=title)
         table.add_column("scene")
         for head in heads:

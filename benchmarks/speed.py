@@ -19,7 +19,8 @@ from benchmarks.machine import Machine, Spread, cores, spread, take_turns, this_
 from symrender_cg import Scene
 from symrender_cg.reference import oracle
 from symrender_cg.reference.compare import Errors, measure
-from symrender_cg.reference.points import near_silhouette, whole_image
+from symrender_cg.reference.hard_places import near_silhouette
+from symrender_cg.reference.points import whole_image
 
 SHORTEST_SAMPLE = 0.015
 """Seconds of a sample: a faster contestant is called several times, and its fastest call counts."""

@@ -13,7 +13,7 @@ from evaluators import same_bits, scene_of
 
 from symrender_cg import Camera, PointLight, Scene, Sphere, render_blocks, render_image
 from symrender_cg.errors import ArgumentError, SceneError
-from symrender_cg.run import blocks, ready, threads
+from symrender_cg.run import blocks, ready, settled_rows, threads
 from symrender_cg.run.threads import block_ends
 
 CAMERA = Camera((0.0, 0.0, 6.0), half_height=1.5)
@@ -101,7 +101,7 @@ WIDTH, SHORT, TALL = 64, 1024, 8192
 @pytest.fixture
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Blocks of 8,192 pixels where two million are usual, so that an image of many blocks is drawn in a moment."""
-    for module in (blocks, ready, threads):
+    for module in (settled_rows, ready, threads):
         monkeypatch.setattr(module, "MOST_PIXELS", 1 << 13)
     monkeypatch.setattr(blocks, "PIXELS_A_BLOCK", 1 << 13)
     block_ends.cache_clear()

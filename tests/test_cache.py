@@ -436,7 +436,7 @@ def test_a_recipe_built_for_this_processor_is_recalled_when_the_compiler_is_gone
     monkeypatch.setenv("CC", "no-such-compiler")  # named, so never passed over
     assert cache.recall("scene") is None
     monkeypatch.delenv("CC")
-    monkeypatch.setattr(cache_module, "cpu_identity", lambda: "another machine")
+    monkeypatch.setattr("symrender_cg.build.entries.cpu_identity", lambda: "another machine")
     assert cache.recall("scene") is None
 
 

@@ -14,7 +14,7 @@ from msgspec import structs
 from symrender_cg import Camera, Phong, PointLight, Scene, Sphere, evaluate, pipeline
 from symrender_cg.errors import AccuracyError
 from symrender_cg.lower.variants import ACCURACIES
-from symrender_cg.reference import brute_force, check_scene, compare, oracle, points
+from symrender_cg.reference import brute_force, check_scene, compare, hard_places, oracle
 from symrender_cg.reference import check as module
 from symrender_cg.reference.check import check, stated_bound
 from symrender_cg.reference.check_rows import STATED_ULP, Report, Row
@@ -64,7 +64,7 @@ def test_the_table_has_a_row_for_each_evaluator_and_set_of_points(shell: Shell) 
 def test_the_numbers_are_those_of_compare_against_the_oracle() -> None:
     scene = Scene.builtin("far")
     report = check(scene, width=8, height=8, count=150, seed=3, accuracies=("literal",))
-    x, y = points.near_silhouette(scene, 150, 3)
+    x, y = hard_places.near_silhouette(scene, 150, 3)
     errors = compare.measure(evaluate(scene, x, y, accuracy="literal"), oracle.evaluate(scene, x, y))
     (row,) = (row for row in report.rows if row.accuracy and row.where == "near silhouette")
     assert (row.max_ulp, row.max_abs, row.count) == (errors.max_ulp, errors.max_abs, 150)

@@ -23,7 +23,7 @@ from symrender_cg.errors import ArgumentError, OutsidePlanError
 from symrender_cg.plan.plan import plan
 from symrender_cg.reference import oracle
 from symrender_cg.reference.brute_force import trace
-from symrender_cg.reference.points import near_highlight
+from symrender_cg.reference.hard_places import near_highlight
 from symrender_cg.run.render import evaluate
 from symrender_cg.scene import Camera, Gradient, Phong, Plane, PointLight, Scene, Sphere
 from symrender_cg.stress.adjoint import Tape, cross, dot, unit, values

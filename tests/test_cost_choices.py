@@ -9,8 +9,7 @@ import pytest
 
 from symrender_cg import Scene, evaluate, translate
 from symrender_cg.cost.sample import Sample, draw_sample, errors_of
-from symrender_cg.cost.search import content
-from symrender_cg.cost.variants import Way, baked, combined, moved, named_ways, way_of
+from symrender_cg.cost.variants import Way, baked, combined, content, moved, named_ways, way_of
 from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.choices import CHOICES, UNSTATED, chosen, named
 from symrender_cg.lower.variants import ACCURACIES, VARIANTS, variant

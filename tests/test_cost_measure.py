@@ -6,21 +6,23 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symrender_cg import Camera, Phong, PointLight, Scene, Sphere, evaluate
+from symrender_cg import Camera, Phong, PointLight, Scene, Sphere, choose, evaluate
 from symrender_cg.cost import search as searching
 from symrender_cg.cost import store
 from symrender_cg.cost.effects import NONE, measure_effects, stages_of
 from symrender_cg.cost.front import with_front
+from symrender_cg.cost.looking import learn
 from symrender_cg.cost.measure import Measured, entries_of, measure
 from symrender_cg.cost.ready import Ready, make_ready, subsamples
 from symrender_cg.cost.report import Errors
 from symrender_cg.cost.sample import LOWEST_BIN, draw_sample, errors_of
 from symrender_cg.cost.timing import interleaved
-from symrender_cg.cost.variants import Way, way_of
+from symrender_cg.cost.variants import Way, content, way_of
 from symrender_cg.reference import oracle
 
 SIZE = (48, 32)
@@ -165,6 +167,23 @@ def test_the_front_holds_the_fastest_and_the_most_accurate(measured: Measured) -
     assert len(measured.report.steps) >= len(front) - 2
 
 
+def test_after_it_nothing_on_the_front_that_meets_a_request_is_faster_than_what_is_chosen(
+    measured: Measured, tmp_path: Any
+) -> None:
+    """By the times that the report holds: it is learned by an empty cache, and nothing more is measured there."""
+    scene, report = Scene.chapter1(), msgspec.structs.replace(measured.report, quick=False)
+    learn(scene, report, measured.top, cache=tmp_path)
+    for limit in (1e-3, 1e-5, 1e-8, 1e-12, 1e-15):
+        found = choose(scene, max_error=limit, cache=tmp_path)
+        bounds = {entry.way: entry.bound for entry in found.considered}
+        meets = [entry for entry in report.front if bounds.get(entry.name, 1.0) <= limit]
+        assert report.entry(found.way).on_front or found.kind == "proved" or len(meets) == 0
+        assert found.ns == report.entry(found.way).ns.median
+        assert all(found.ns <= entry.ns.median for entry in meets)
+        assert set(bounds) >= {entry.name for entry in report.front if entry.kind == "level" and entry.bound is None}
+    assert not (tmp_path / "kernels").exists()
+
+
 def worse(ready: Ready, error: float) -> Ready:
     """The way with its values off by so much."""
 
@@ -212,7 +231,7 @@ def test_a_search_stays_within_its_budget_and_tries_nothing_twice(monkeypatch: p
         found = searching.search(scene, (32, 32), seed=1, budget=budget)
         assert found.tried <= budget
         assert sum(one.way.kind == "choice" for one in found.ready) >= choices
-        contents = [searching.content(one.way) for one in found.ready]
+        contents = [content(one.way) for one in found.ready]
         assert len(set(contents)) == len(contents)
 
 

@@ -21,7 +21,7 @@ from symrender_cg.derive.proofs import prove_invariants
 from symrender_cg.derive.symbols import INPUTS, latex_names, symbol, symbols
 from symrender_cg.pipeline import translate
 from symrender_cg.plan.plan import plan
-from symrender_cg.reference import points
+from symrender_cg.reference import camera_numbers, decisions, hard_places
 from symrender_cg.scene import Scene
 
 X, Y, E, R = symbols("x y eye radius")
@@ -224,14 +224,14 @@ def test_the_invariants_of_the_derivation_are_proved(name: str) -> None:
 def test_the_exact_sign_tests_are_the_discriminant_and_m_dot_d(name: str) -> None:
     """The monomials, summed in rationals at float64 points, have the sign that whole-number arithmetic gives."""
     scene = STRUCTURES[name]
-    numbers = points.frame_numbers(scene)
+    numbers = camera_numbers.frame_numbers(scene)
     tests = sign_tests(image(name))
     assert [test.name for test in tests] == list(image(name).guard)
     assert all(len(monomial.factors) <= 4 for test in tests for monomial in test.monomials)
     place = {"eye": numbers.eye, "radius": numbers.radius}
     place |= {f"center_{axis}": value for axis, value in zip("xyz", numbers.center, strict=True)}
-    hit = points.exact_hit_test(numbers)
-    xs, ys = points.near_silhouette(scene, 60, 1)
+    hit = decisions.exact_hit_test(numbers)
+    xs, ys = hard_places.near_silhouette(scene, 60, 1)
     random = np.random.default_rng(2).uniform(-6.0, 6.0, (2, 60))
     for x, y in zip(np.concatenate([xs, random[0]]), np.concatenate([ys, random[1]]), strict=True):
         exact = {key: Fraction(float(value)) for key, value in (place | {"x": x, "y": y}).items()}

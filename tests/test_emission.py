@@ -176,7 +176,7 @@ def test_every_step_is_declared_const_once_where_it_is_first_known(name: str, ac
     shades = re.findall(r"^SYMRENDER_INLINE \w+ (?:shade|stage_\d+)\(.*?^\}", text, flags=re.DOTALL | re.MULTILINE)
     assert len(shades) == max(1, len(program.stages))
     for line in (line for shade in shades for line in shade.split("\n")[1:-1]):
-        assert re.match(r"\s*(const|return|\*|b->\w+\[i\] = \w+;|\{|$)|\s{8}", line), line
+        assert re.match(r"\s*(const|return|\*|b->\w+\[i\] = (p\.)?\w+;|\{|$)|\s{8}", line), line
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)
@@ -274,15 +274,15 @@ def contexts(monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[str, Any]]:
 
 
 def asked_for(name: str) -> set[str]:
-    """Keys that a template, or one that it includes, reads and does not define itself."""
+    """Keys that a template, or one that it includes, reads and that it does not define."""
     tree = c99.environment().parse((templates() / name).read_text(encoding="utf-8"))
     included = {str(other) for other in meta.find_referenced_templates(tree)}
     own = {macro.name for macro in tree.find_all(jinja2.nodes.Macro)}
-    own |= {
-        entry.target.name for entry in tree.find_all(jinja2.nodes.Assign) if isinstance(entry.target, jinja2.nodes.Name)
-    }
+    targets = [entry.target for entry in tree.find_all(jinja2.nodes.Assign)]
+    named = [name for target in targets for name in (target, *target.find_all(jinja2.nodes.Name))]
+    own |= {name.name for name in named if isinstance(name, jinja2.nodes.Name)}
     own |= {name for entry in tree.find_all(jinja2.nodes.FromImport) for name in entry.names if isinstance(name, str)}
-    return (meta.find_undeclared_variables(tree) - own).union(*map(asked_for, included))
+    return meta.find_undeclared_variables(tree).union(*map(asked_for, included)) - own
 
 
 @pytest.mark.parametrize("key", ["name", "real", "baked"])

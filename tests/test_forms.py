@@ -16,9 +16,9 @@ from symrender_cg.derive.image import derive
 from symrender_cg.derive.program import Definition, ImageProgram
 from symrender_cg.derive.proofs import prove_form
 from symrender_cg.derive.symbols import symbol, symbols
-from symrender_cg.lower.variants import VARIANTS, Variant
+from symrender_cg.lower.variants import LEVELS, VARIANTS, Variant
 from symrender_cg.plan.plan import plan
-from symrender_cg.reference import oracle, points
+from symrender_cg.reference import hard_places, oracle
 from symrender_cg.run.numbers import numbers_of
 
 FULL = ("centred_sphere", "off_axis_sphere", "any_sphere")
@@ -60,7 +60,7 @@ def test_every_form_makes_a_claim() -> None:
 
 
 def test_every_form_is_used_by_a_variant_and_every_variant_names_forms_that_exist() -> None:
-    assert {name for entry in VARIANTS for name in entry.forms} == {entry.name for entry in FORMS}
+    assert {name for entry in (*VARIANTS, *LEVELS) for name in entry.forms} == {entry.name for entry in FORMS}
     with pytest.raises(KeyError):
         form("no_such_form")
 
@@ -89,6 +89,13 @@ WRONG = [
     ("cross_foot", "any_sphere", "n_y", sp.Integer(1)),
     ("light_in_radii", "centred_sphere", "w_x", sp.Rational(1, 10**6)),
     ("mirrored_ray", "centred_sphere", "mirror_x", X),
+    ("centred_foot_dot_lamp", "centred_sphere", "slope", symbol("depth")),
+    ("off_axis_foot_dot_lamp", "off_axis_sphere", "base", Y),
+    ("inner_products", "centred_sphere", "w_dot_mirror", symbol("facing")),
+    ("middle_facing", "centred_sphere", "facing2_middle", X),
+    ("mirrored_foot", "centred_sphere", "spread", symbol("focal")),
+    ("mirrored_foot", "off_axis_sphere", "foot_x", Y),
+    ("mirrored_foot", "any_sphere", "gap2", symbol("radius")),
     ("diffuse_gain", "centred_sphere", "diffuse", symbol("k_diffuse")),
 ]
 
@@ -153,7 +160,7 @@ def hits_of(structure: str) -> list[tuple[float, float]]:
     half_height = scene.in_camera_frame().camera.half_height
     assert half_height is not None
     wide = np.random.default_rng(1).uniform(-half_height, half_height, (2, 60))
-    near = points.near_silhouette(scene, 30, 3)
+    near = hard_places.near_silhouette(scene, 30, 3)
     x, y = np.concatenate([wide[0], near[0]]), np.concatenate([wide[1], near[1]])
     hit = oracle.hits(scene, x, y)
     assert hit.sum() >= 10

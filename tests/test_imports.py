@@ -68,6 +68,12 @@ def test_imports_go_one_way_in_the_order_of_the_pipeline(part: str) -> None:
         assert not above, f"{path.relative_to(ROOT)} imports {sorted(above)}"
 
 
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_no_module_imports_a_private_name_of_another(path: Path) -> None:
+    names = {name for name in imported(path) if name.startswith("symrender_cg.")}
+    assert not {name for name in names if any(word.startswith("_") for word in name.split("."))}
+
+
 @pytest.mark.parametrize("part", NO_SYMPY)
 def test_the_parts_that_run_without_sympy_do_not_name_it(part: str) -> None:
     for path in modules(part):

@@ -37,7 +37,7 @@ from strategies import centred_scenes, image_points, nasty_scenes, ordinary_scen
 
 from symrender_cg import evaluate, render_image
 from symrender_cg.errors import OutsidePlanError, SceneError
-from symrender_cg.reference import oracle, points
+from symrender_cg.reference import hard_places, oracle
 from symrender_cg.reference.compare import measure
 from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere, Vector
 
@@ -162,7 +162,11 @@ def points_of(scene: Scene, seed: int) -> tuple[FloatArray, FloatArray]:
     assert half_height is not None
     random = np.random.default_rng(seed)
     everywhere = random.uniform(-half_height, half_height, (2, 20))
-    sets = [tuple(everywhere), points.near_silhouette(scene, 20, seed), points.near_terminator(scene, 20, seed)]
+    sets = [
+        tuple(everywhere),
+        hard_places.near_silhouette(scene, 20, seed),
+        hard_places.near_terminator(scene, 20, seed),
+    ]
     return np.concatenate([x for x, _ in sets]), np.concatenate([y for _, y in sets])
 
 
@@ -228,7 +232,7 @@ def test_hit_or_miss_is_never_wrong_within_ulps_of_the_silhouette(family: str, e
     random = np.random.default_rng(11)
     for seed in range(1 if family == "chapter1" else SCENES):
         scene = FAMILIES[family](random)
-        x, y = points.near_silhouette(scene, 120, seed)
+        x, y = hard_places.near_silhouette(scene, 120, seed)
         assert decides_as_the_oracle(entry, scene, x, y), scene
 
 
@@ -236,7 +240,7 @@ def test_the_literal_formula_does_decide_wrongly_there() -> None:
     """The control of the test above: its points are hard enough to catch a formula that cancels."""
     random = np.random.default_rng(11)
     scenes = [_eye_far(random) for _ in range(12)]
-    sets = [(scene, *points.near_silhouette(scene, 120, seed)) for seed, scene in enumerate(scenes)]
+    sets = [(scene, *hard_places.near_silhouette(scene, 120, seed)) for seed, scene in enumerate(scenes)]
     assert not all(decides_as_the_oracle(evaluator("literal"), *entry) for entry in sets)
 
 
@@ -253,7 +257,7 @@ def test_a_sphere_that_all_but_touches_the_plane_of_the_eye_is_decided_exactly(a
     for k in (3, 20, 40, 52, 60, 90, 200):
         center = (1.5, 0.25, -(2.0**-k))  # depth 1 + 2^-k radii, exactly
         scene = Scene(Camera((0.0, 0.0, 1.0), half_height=4.0), (Sphere(center, 1.0),))
-        x, y = points.near_silhouette(scene, 90, k)
+        x, y = hard_places.near_silhouette(scene, 90, k)
         assert decides_as_the_oracle(evaluator(accuracy), scene, x, y), k
 
 
@@ -343,7 +347,7 @@ def test_the_more_general_kernel_agrees_with_the_special_one(
     """Within twice the bound of either; and where hit or miss is exact, on the same hits."""
     scene = with_background(scene_of(geometry, light=(1.0, 2.0, 3.0)), MARKER)
     x, y = square_of_points(scene, 96)
-    near = points.near_silhouette(scene, 300, 5)
+    near = hard_places.near_silhouette(scene, 300, 5)
     special, general = evaluate(scene, x, y, accuracy=accuracy), evaluate_forced(scene, x, y, accuracy, force)
     assert np.abs(special - general).max() <= 2.0 * GRID_BOUND[accuracy]
     if accuracy in EXACT:
@@ -374,14 +378,17 @@ def test_the_gate_only_removes_highlights_where_the_light_is_below_the_horizon(a
 @pytest.mark.parametrize("entry", EXACT_EVALUATORS, ids=lambda entry: entry.name)
 @pytest.mark.parametrize("radius", [1.0, 0.1, 3.3, 7.0 / 3.0])
 def test_a_light_exactly_at_the_hit_point_adds_nothing(entry: Evaluator, radius: float) -> None:
-    """w = 0 there: the seed divides by it. At the foot of the eye the hit point is a float64 point for any radius."""
+    """w = 0 there: the seed divides by it. At the foot of the eye the hit point is a float64 point for any radius; in
+    float32 it is rounded, and may lie beside the light: then the light adds what it adds beside it, never infinity.
+    """
     origin = np.zeros(1)
     centred = Scene(Camera((0.0, 0.0, 4.0 * radius)), (Sphere((0.0, 0.0, 0.0), radius),), (PointLight((0, 0, radius)),))
     camera = Camera((0.0, 0.0, 4.0 * radius), half_height=1.0)
     off_axis = Scene(camera, (Sphere((0.0, 0.0, -radius), radius),), (PointLight((0.0, 0.0, 0.0)),))
     for scene in (centred, off_axis):
         assert oracle.evaluate(scene, origin, origin).value[0] == 0.1
-        assert entry.values(scene, origin, origin)[0] == entry.dtype(0.1)
+        value = entry.values(scene, origin, origin)[0]
+        assert value == entry.dtype(0.1) or (entry.name in ("single", "fast") and 0.1 <= value < 1.3 + 1e-5)
 
 
 @pytest.mark.parametrize("entry", EXACT_EVALUATORS, ids=lambda entry: entry.name)

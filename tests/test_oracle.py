@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from strategies import image_points, nasty_scenes, scaled
 
 from symrender_cg.errors import ArgumentError, SceneError
-from symrender_cg.reference import oracle, points
+from symrender_cg.reference import camera_numbers, hard_places, oracle, points
 from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere
 
 CASES: list[dict[str, Any]] = json.loads(Path(__file__).with_name("hardcases.json").read_text())["cases"]
@@ -53,7 +53,7 @@ def point_of(case: dict[str, Any]) -> tuple[float, float]:
 
 def by_mpmath(scene: Scene, x: float, y: float, digits: int) -> mpmath.mpf | None:
     """Chapter 1's formula as it stands at `digits` digits; None for a miss."""
-    f = points.frame_numbers(scene)
+    f = camera_numbers.frame_numbers(scene)
     with mpmath.workdps(digits):
         eye, ray = mpmath.matrix([0, 0, f.eye]), mpmath.matrix([x, y, -f.eye])
         center, light, radius = mpmath.matrix(f.center), mpmath.matrix(f.light), mpmath.mpf(f.radius)
@@ -156,9 +156,9 @@ def test_off_axis_values_are_mpmath_s_at_120_digits() -> None:
         x, y = (
             np.concatenate(parts)
             for parts in zip(
-                points.near_silhouette(scene, 6, index),
-                points.near_terminator(scene, 6, index),
-                points.near_highlight(scene, 4, index),
+                hard_places.near_silhouette(scene, 6, index),
+                hard_places.near_terminator(scene, 6, index),
+                hard_places.near_highlight(scene, 4, index),
                 random.uniform(-3.0, 3.0, (2, 6)),
                 strict=True,
             )
@@ -207,7 +207,7 @@ def test_scaling_all_lengths_by_a_power_of_two_changes_nothing(data: st.DataObje
         (Sphere((0.25, -0.5, 0.125), 1.0, Phong(0.1, 0.7, 0.5, 37.5)),),
         (PointLight((data.draw(st.floats(-9.0, 9.0).filter(lambda v: v == 0 or abs(v) > 1e-9)), 2.0, 3.0)),),
     )
-    x, y = points.near_silhouette(scene, 12, 3)
+    x, y = hard_places.near_silhouette(scene, 12, 3)
     x, y = np.append(x, np.linspace(-1.0, 1.0, 8)), np.append(y, np.linspace(0.5, -0.25, 8))
     here, there = oracle.evaluate(scene, x, y), oracle.evaluate(scaled(scene, k), np.ldexp(x, k), np.ldexp(y, k))
     for name in ("value", "residual", "hit", "value32"):
@@ -298,5 +298,5 @@ def test_the_precision_of_python_flint_is_left_as_it_was() -> None:
     before = ctx.prec
     oracle.evaluate(Scene(), 0.0, 0.0)
     oracle.enclose(Scene(), 0.0, 0.0, bits=500)
-    points.near_highlight(Scene(), 3, 0)
+    hard_places.near_highlight(Scene(), 3, 0)
     assert ctx.prec == before

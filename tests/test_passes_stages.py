@@ -16,7 +16,9 @@ from evaluators import STRUCTURES, FloatArray, Values, same_bits
 from symrender_cg.derive.symbols import symbol, symbols
 from symrender_cg.emit.printer import C_TYPES
 from symrender_cg.lower import fission
+from symrender_cg.lower.anchors import anchor, anchoring, narrow_products
 from symrender_cg.lower.fission import crossing, cut, cycles, weight
+from symrender_cg.lower.formats import convert_formats
 from symrender_cg.lower.freeze import freeze
 from symrender_cg.lower.program import KernelProgram, Step
 from symrender_cg.lower.switches import NAMES, Passes
@@ -34,10 +36,20 @@ CENTRED = tuple(name for name in STAGED if name.startswith("centred_sphere"))
 X, Y, A, REACH = (*symbols("x y"), symbol("a"), symbol("reach"))
 
 
+CLOSE = {"single": 3e-6, "fast": 4e-4}
+"""Rows count pixels in float32 where points do not: both are within the promise, some units in the last place apart,
+and for fast, where one of its polynomials gives way to the next, twice the bound of a power."""
+
+
 def without(level: str, *passes: str) -> Variant:
     """A level with some of its passes off."""
     found = variant(level)
     return replace(found, name=f"{level}_without", passes=Passes().without(*passes))
+
+
+def uncounted(level: str) -> str | Variant:
+    """A level whose rows and points have the same bits: the pixels of its rows are not counted in float32."""
+    return level if level == "double" else without(level, "anchors")
 
 
 @cache
@@ -121,8 +133,19 @@ def test_a_row_and_its_points_have_the_same_bits_left_and_right(name: str, level
         return
     scene = STRUCTURES[name]
     for width, height in ((1, 5), (2, 4), (37, 11), (64, 6), (611, 4)):
-        image, values = image_and_points(scene, level, width, height)
+        image, values = image_and_points(scene, uncounted(level), width, height)
         assert same_bits(image, values), (width, height)
+
+
+@pytest.mark.parametrize("level", ["fast", "single"])
+@pytest.mark.parametrize("name", ["centred_sphere", "centred_sphere_gated", "off_axis_sphere", "off_axis_sphere_matte"])
+def test_pixels_counted_in_float32_are_close_to_points(name: str, level: str) -> None:
+    """Widths: odd, even, beyond one block, not whole vectors. What hits is the same."""
+    scene = STRUCTURES[name]
+    for width, height in ((1, 5), (2, 4), (37, 11), (611, 4)):
+        image, values = image_and_points(scene, level, width, height)
+        assert np.max(np.abs(image - values)) <= CLOSE[level], (width, height)
+        assert np.array_equal(image == scene.background, values == scene.background)
 
 
 def test_gathering_moves_the_even_members_of_a_sum_into_a_step() -> None:
@@ -174,7 +197,8 @@ def test_stages_hold_each_step_once_and_nothing_before_what_it_uses(name: str, l
     order = [entry for stage in program.stages for entry in stage]
     assert bool(order) == (name in STAGED)
     assert len(set(order)) == len(order)
-    pixel = {entry.name for entry in program.at("pixel")}
+    pixel = {entry.name for entry in program.at("pixel")} - dict(program.anchors).keys()
+    assert not pixel & dict(program.anchors).keys()
     for at, entry in enumerate(order):
         assert program[entry].uses() & pixel <= set(order[:at]), entry
     if order:
@@ -238,11 +262,11 @@ def test_fission_changes_no_bit(name: str, level: str) -> None:
     with_it, _ = image_and_points(scene, without(level, "whole"), 61, 40)
     whole, points = image_and_points(scene, without(level, "fission"), 61, 40)
     assert same_bits(with_it, whole)
-    assert same_bits(whole, points)
+    assert same_bits(whole, points) if level == "double" else np.max(np.abs(whole - points)) <= CLOSE[level]
 
 
 @pytest.mark.parametrize(
-    "off", [("symmetry",), ("halves",), ("prefetch",), ("symmetry", "fission"), NAMES], ids=" ".join
+    "off", [("symmetry",), ("halves",), ("anchors",), ("prefetch",), ("symmetry", "fission"), NAMES], ids=" ".join
 )
 @pytest.mark.parametrize("level", LEVELS)
 def test_each_pass_can_be_left_out_and_the_promise_stands(level: str, off: tuple[str, ...]) -> None:
@@ -250,7 +274,8 @@ def test_each_pass_can_be_left_out_and_the_promise_stands(level: str, off: tuple
     bound = {"double": 1e-15, "single": 5e-6, "fast": 1.0 / 255.0}[level]
     chosen = without(level, *off)
     image, values = image_and_points(scene, chosen, 30, 24)
-    assert same_bits(image, values)
+    counted = level != "double" and "anchors" not in off and chosen.passes.staged
+    assert np.max(np.abs(image - values)) <= CLOSE[level] if counted else same_bits(image, values)
     drawing = draw(scene, chosen, size=(30, 24))
     for x, y, value in zip(*(a.ravel() for a in centres(drawing.pixel, 30, 24)), image.ravel(), strict=True):
         if (x, y) != (0.0, 0.0) and abs(x) + abs(y) < 1.5:
@@ -264,7 +289,7 @@ def test_an_even_whole_exponent_takes_the_shortcut_and_keeps_the_promise(level: 
     scene = Scene.chapter1(shininess=shininess)
     image, values = image_and_points(scene, level, 40, 33)
     plain, _ = image_and_points(scene, without(level, "whole"), 40, 33)
-    assert same_bits(image, values)
+    assert same_bits(image, values) if level == "double" else np.max(np.abs(image - values)) <= CLOSE[level]
     assert not same_bits(image, plain), "it was taken"
     bound = {"double": 2e-15, "single": 5e-6}[level]
     assert np.max(np.abs(image.astype(np.float64) - plain)) <= bound
@@ -274,9 +299,92 @@ def test_an_even_whole_exponent_takes_the_shortcut_and_keeps_the_promise(level: 
 @pytest.mark.parametrize("shininess", [0.0, 1.0, 2.0, 2.5, 6.0, 37.5, 33.0, 1026.0, 1e300])
 def test_other_exponents_take_the_way_of_all(level: str, shininess: float) -> None:
     scene = Scene.chapter1(shininess=shininess)
-    image, _ = image_and_points(scene, level, 40, 33)
+    image, _ = image_and_points(scene, without(level), 40, 33)
     plain, _ = image_and_points(scene, without(level, "whole"), 40, 33)
-    assert same_bits(image, plain)
+    assert same_bits(image, plain) == (level != "fast" or not 32.0 <= shininess < 1e10)
+
+
+@pytest.mark.parametrize("shininess", [32.0, 37.5, 100.0, 999.5])
+def test_a_narrow_lobe_of_fast_stays_within_a_grey_level(shininess: float) -> None:
+    """Against float64; the bound is that of the power, doubled for cos^2 in float32."""
+    scene = Scene.chapter1(shininess=shininess)
+    image, _ = image_and_points(scene, "fast", 200, 200)
+    exact, _ = image_and_points(scene, "double", 200, 200)
+    assert np.max(np.abs(image - exact)) <= 4e-4
+
+
+# ---- anchors
+
+
+@pytest.mark.parametrize("level", ["fast", "single"])
+@pytest.mark.parametrize("name", STAGED)
+def test_what_moves_with_x_is_counted_and_no_stage_needs_x(name: str, level: str) -> None:
+    program = translated(name, level).program
+    places = dict(program.anchors)
+    assert (places["from_left_single"], places["x_single"], places["to_right_single"]) == ("first", "middle", "last")
+    staged = {entry for stage in program.stages for entry in stage}
+    assert all(program[entry].format == "float32" for entry in staged)
+    assert "x" not in {used for entry in staged for used in program[entry].uses()}
+    assert {entry.name for entry in anchoring(program)} >= {"from_left", "to_right"}
+
+
+def test_double_counts_no_pixels() -> None:
+    assert translated("centred_sphere", "double").program.anchors == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "place"),
+    [
+        (X - A, "middle"),
+        (X - symbol("x_left"), "first"),
+        (symbol("x_right") - X, "last"),
+        (A - X, None),
+        (2 * X, None),
+        (X**2, None),
+        (X + X * A, None),
+        (A * 2, None),
+    ],
+    ids=str,
+)
+def test_an_anchor_moves_one_for_one_with_x_and_is_counted_from_where_it_vanishes(
+    value: sp.Expr, place: str | None
+) -> None:
+    program = freeze(
+        span_program(step("moved", value), replace(step("result", symbol("moved") ** 2), format="float32"))
+    )
+    found = anchor(convert_formats(program)).anchors
+    assert found == ((("moved_single", place),) if place else ())
+
+
+def test_where_x_is_used_otherwise_nothing_is_counted() -> None:
+    far, wide = replace(step("far", symbol("moved") * symbol("wide")), format="float32"), step("wide", X**2)
+    program = convert_formats(freeze(span_program(step("moved", X - A), wide, far)))
+    assert anchor(program).anchors == ()
+
+
+def test_only_products_are_narrowed() -> None:
+    moved, narrow = symbol("moved"), step("chord", symbol("moved") * A)
+    program = span_program(step("moved", X - A), narrow, step("sum", moved + A), step("result", moved**2 * A))
+    formats = {entry.name: entry.format for entry in narrow_products(program).at("pixel")}
+    assert formats == {"moved": "float64", "chord": "float32", "sum": "float64", "result": "float64"}
+    assert narrow_products(narrow_products(program)) == narrow_products(program)
+
+
+@pytest.mark.parametrize("level", ["fast", "single"])
+@pytest.mark.parametrize("eye", [1.0009, 4.0, 1e6, 2.0**49.9])
+def test_the_outline_is_as_good_where_pixels_are_counted(level: str, eye: float) -> None:
+    """The first and the last hit of every row of a wide image, where the root of a small difference is taken: as far
+    from float64 as where each pixel is computed from its own x."""
+    scene = Scene.chapter1(eye=eye, shininess=37.5)
+    bound = {"single": 3e-6, "fast": 1e-3}[level]
+    rows, _ = image_and_points(scene, level, 2001, 25)
+    exact, points = image_and_points(scene, "double", 2001, 25)
+    assert same_bits(exact, points)
+    hit = exact != scene.background
+    assert np.array_equal(rows != scene.background, hit)
+    ends = [(j, i) for j in range(25) if hit[j].any() for i in np.nonzero(hit[j])[0][[0, -1]]]
+    assert len(ends) > 30
+    assert max(abs(float(rows[j, i]) - exact[j, i]) for j, i in ends) <= bound
 
 
 def test_with_all_passes_off_a_pixel_is_one_function() -> None:

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from strategies import image_points, nasty_scenes, ordinary_scenes, scaled
 
 from symrender_cg.errors import ArgumentError, SceneError
-from symrender_cg.reference import oracle, points, vectorised
+from symrender_cg.reference import decisions, hard_places, oracle, points, stable_tiles
+from symrender_cg.reference.camera_numbers import frame_numbers
 from symrender_cg.reference.compare import Errors, measure
 from symrender_cg.reference.oracle import Answers
 from symrender_cg.reference.per_pixel import evaluate_per_pixel, render_per_pixel
-from symrender_cg.reference.points import frame_numbers, pixel_centres, whole_image
+from symrender_cg.reference.points import pixel_centres, whole_image
 from symrender_cg.reference.vectorised import evaluate_vectorised, render_vectorised
 from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere
 
@@ -193,9 +194,9 @@ def hard_points(scene: Scene, seed: int) -> points.Points:
     random = np.random.default_rng(seed)
     half = frame_numbers(scene).half_height
     sets = [
-        points.near_silhouette(scene, 45, seed),
-        points.near_terminator(scene, 30, seed),
-        points.near_highlight(scene, 30, seed),
+        hard_places.near_silhouette(scene, 45, seed),
+        hard_places.near_terminator(scene, 30, seed),
+        hard_places.near_highlight(scene, 30, seed),
         (random.uniform(-half, half, 45), random.uniform(-half, half, 45)),
     ]
     return np.concatenate([x for x, _ in sets]), np.concatenate([y for _, y in sets])
@@ -245,7 +246,7 @@ def test_the_stable_form_on_chapter_1_is_a_few_1e_16_off() -> None:
 def test_the_stable_highlight_s_error_grows_with_the_root_of_the_shininess(shininess: float) -> None:
     for seed in range(4):
         scene = with_material(families(seed)[1][1], Phong(0.1, 0.7, 0.5, shininess))
-        x, y = points.near_highlight(scene, 60, seed)
+        x, y = hard_places.near_highlight(scene, 60, seed)
         if x.size:
             answers = oracle.evaluate(scene, x, y)
             errors = measure(evaluate_vectorised(scene, x, y), answers)
@@ -260,7 +261,7 @@ def test_hits_of_the_stable_form_are_the_oracle_s_on_nasty_scenes(data: st.DataO
     scene = data.draw(nasty_scenes())
     pairs = [data.draw(image_points(scene)) for _ in range(8)]
     x, y = (np.array(part) for part in zip(*pairs, strict=True))
-    edge_x, edge_y = points.near_silhouette(scene, 16, 0)
+    edge_x, edge_y = hard_places.near_silhouette(scene, 16, 0)
     x, y = np.append(x, edge_x), np.append(y, edge_y)
     truth = oracle.hits(scene, x, y)
     for dtype in (np.float64, np.float32):
@@ -280,7 +281,7 @@ def test_ordinary_scenes_stay_within_the_bound(scene: Scene) -> None:
         x, y = whole_image(scene, 12, 12)
     except SceneError:
         return
-    edge_x, edge_y = points.near_silhouette(scene, 12, 0)
+    edge_x, edge_y = hard_places.near_silhouette(scene, 12, 0)
     x, y = np.append(x, edge_x), np.append(y, edge_y)
     errors = measure(evaluate_vectorised(scene, x, y), oracle.evaluate(scene, x, y))
     assert errors.max_abs <= 2e-14 * (1.0 + radii_over_nearest_light(scene))
@@ -290,7 +291,7 @@ def test_the_gate_is_decided_exactly_at_the_terminator() -> None:
     for seed in range(8):
         for index in (0, 1, 3, 4):
             scene = with_material(families(seed)[index][1], Phong(0.0, 0.0, 1.0, 0.0, gate_specular=True))
-            x, y = points.near_terminator(scene, 40, seed)
+            x, y = hard_places.near_terminator(scene, 40, seed)
             truth = oracle.evaluate(scene, x, y)
             for dtype in (np.float64, np.float32):
                 np.testing.assert_array_equal(evaluate_vectorised(scene, x, y, dtype=dtype), truth.value)
@@ -311,7 +312,7 @@ def test_an_image_has_the_bits_of_its_points_whatever_the_tiles(monkeypatch: pyt
         image = render_vectorised(scene, 70, 50, clip=False)
         x, y = whole_image(scene, 70, 50)
         np.testing.assert_allclose(evaluate_vectorised(scene, x, y).reshape(50, 70), image, rtol=0.0, atol=4 * U)
-        monkeypatch.setattr(vectorised, "CHUNK", 33)
+        monkeypatch.setattr(stable_tiles, "CHUNK", 33)
         np.testing.assert_allclose(render_vectorised(scene, 70, 50, clip=False), image, rtol=0.0, atol=4 * U)
         monkeypatch.undo()
 
@@ -347,7 +348,7 @@ def test_form_dtype_and_size_that_do_not_exist_are_refused() -> None:
 # ------------------------------------------------------------------------------------------------------ point sets
 
 
-@pytest.mark.parametrize("make", [points.near_silhouette, points.near_terminator, points.near_highlight])
+@pytest.mark.parametrize("make", [hard_places.near_silhouette, hard_places.near_terminator, hard_places.near_highlight])
 def test_point_sets_are_a_function_of_scene_count_and_seed(make: object) -> None:
     assert callable(make)
     first, again, other = make(Scene(), 30, 5), make(Scene(), 30, 5), make(Scene(), 30, 6)
@@ -360,7 +361,7 @@ def test_point_sets_are_a_function_of_scene_count_and_seed(make: object) -> None
 
 def test_silhouette_points_lie_on_both_sides_down_to_neighbouring_floats() -> None:
     for name, scene in families(3):
-        x, y = points.near_silhouette(scene, 60, 1)
+        x, y = hard_places.near_silhouette(scene, 60, 1)
         nearest_x, nearest_y = x[::3], y[::3]
         hit = oracle.hits(scene, nearest_x, nearest_y)
         assert 0 < hit.sum() < hit.size, name
@@ -373,12 +374,12 @@ def test_silhouette_points_lie_on_both_sides_down_to_neighbouring_floats() -> No
 
 def test_terminator_points_have_small_n_dot_l_of_both_signs() -> None:
     for name, scene in families(3)[:5]:
-        x, y = points.near_terminator(scene, 120, 1)
+        x, y = hard_places.near_terminator(scene, 120, 1)
         if not x.size:
             continue
         flat = with_material(scene, Phong(0.0, 1.0, 0.0))
         numbers = frame_numbers(scene)
-        lit = np.array([points.exact_lit_test(numbers)(u, v, -numbers.eye) for u, v in zip(x, y, strict=True)])
+        lit = np.array([decisions.exact_lit_test(numbers)(u, v, -numbers.eye) for u, v in zip(x, y, strict=True)])
         n_dot_l = oracle.evaluate(flat, x, y).value
         np.testing.assert_array_equal(lit, n_dot_l > 0.0)
         assert 0 < lit.sum() < lit.size, name
@@ -391,7 +392,7 @@ def test_highlight_points_reach_the_whole_specular_term() -> None:
     found = 0
     for seed in range(6):
         scene = with_material(families(seed)[1][1], Phong(0.0, 0.0, 1.0, 50.0))
-        x, y = points.near_highlight(scene, 40, seed)
+        x, y = hard_places.near_highlight(scene, 40, seed)
         if x.size:
             found += 1
             value = oracle.evaluate(scene, x, y).value
@@ -402,10 +403,10 @@ def test_highlight_points_reach_the_whole_specular_term() -> None:
 
 def test_sets_of_curves_that_cannot_be_seen_are_empty() -> None:
     inside = Scene(lights=(PointLight((0.0, 0.1, 0.2)),))
-    assert points.near_terminator(inside, 5, 0)[0].size == points.near_highlight(inside, 5, 0)[0].size == 0
+    assert hard_places.near_terminator(inside, 5, 0)[0].size == hard_places.near_highlight(inside, 5, 0)[0].size == 0
     behind = Scene(lights=(PointLight((0.0, 0.0, -5.0)),))
-    assert points.near_highlight(behind, 5, 0)[0].size == 0
-    assert points.near_silhouette(Scene(Camera(half_height=1.0), (Sphere((0.0, 0.0, 9.0)),)), 5, 0)[0].size == 0
+    assert hard_places.near_highlight(behind, 5, 0)[0].size == 0
+    assert hard_places.near_silhouette(Scene(Camera(half_height=1.0), (Sphere((0.0, 0.0, 9.0)),)), 5, 0)[0].size == 0
 
 
 # --------------------------------------------------------------------------------------------------------- compare

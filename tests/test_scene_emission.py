@@ -181,6 +181,9 @@ def test_lights_leave_no_trace_where_nothing_is_lit() -> None:
                 assert not re.search(r"\blamps?\b|cosine|nearness|\breach\(", body_of(emitted(need, accuracy))), need
 
 
+ENTRIES = ("prepare", "release", "rows", "points", "prepare_many", "release_many", "batch")
+
+
 def test_no_state_is_kept_between_calls_and_every_function_but_the_entry_points_is_static() -> None:
     for accuracy in ACCURACIES:
         files = emitted(EVERY_EFFECT, accuracy)
@@ -189,7 +192,7 @@ def test_no_state_is_kept_between_calls_and_every_function_but_the_entry_points_
             if re.match(r"\s*static\b", line):
                 assert re.match(r"\s*static (const|inline)\b", line) or "(" in line, line
         entries = set(re.findall(rf"^[^\s#/}}].*?\b({files.name}_\w+)\([^;]*$", code, flags=re.MULTILINE))
-        assert entries == {f"{files.name}_{name}" for name in ("prepare", "release", "rows", "points")}
+        assert entries == {f"{files.name}_{name}" for name in ENTRIES}
 
 
 DIGESTS = f"""

@@ -23,7 +23,7 @@ from scene_strategies import random_scene, scaled, scene_points, scenes
 from strategies import image_points, nasty_scenes
 
 from symrender_cg.errors import AccuracyError, ArgumentError
-from symrender_cg.reference import brute_force, oracle, points
+from symrender_cg.reference import brute_force, hard_places, oracle
 from symrender_cg.reference.compare import measure
 from symrender_cg.reference.oracle import Answers
 from symrender_cg.reference.oracle.one_sphere import OneSphere, takes
@@ -81,7 +81,7 @@ def test_silhouettes_terminators_and_highlights_are_the_one_sphere_oracle_s_bit_
     for gate in (False, True):
         material = Phong(0.1, 0.7, 0.5, 37.5, gate)
         scene = Scene(CAMERA, (Sphere((0.3, -0.2, 0.5), 0.8, material),), (PointLight((2.0, 3.0, 1.0), 0.9),), 0.25)
-        for find in (points.near_silhouette, points.near_terminator, points.near_highlight):
+        for find in (hard_places.near_silhouette, hard_places.near_terminator, hard_places.near_highlight):
             assert_as_one_sphere(scene, *find(scene, 60, 3))
 
 

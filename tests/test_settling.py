@@ -33,8 +33,8 @@ from symrender_cg.run.threads import over_rows
 from symrender_cg.scene import Phong, PointLight, Scene
 from symrender_cg.stress.families import FAMILIES
 
-KERNELS = [(name, level.name) for name in STRUCTURES for level in LEVELS]
 BY_NAME = {level.name: level for level in LEVELS}
+KERNELS = [(name, level) for name in STRUCTURES for level in BY_NAME]
 CASES = 120 if THOROUGH else 8
 SCENES = 3_000 if THOROUGH else 120
 RUN = (
@@ -49,7 +49,7 @@ PLANS = {"centred_sphere", "centred_sphere_matte", "centred_sphere_gated", "any_
 
 @cache
 def translated(name: str, level: str) -> SphereTranslation:
-    found = translate(STRUCTURES[name], level)
+    found = translate(STRUCTURES[name], BY_NAME[level])
     assert isinstance(found, SphereTranslation)
     return found
 
@@ -183,11 +183,15 @@ def test_the_loop_over_pixels_is_a_loop_over_vectors(name: str, level: str) -> N
         loop.line: loop.bytes for loop in report(files.files, toolchain=toolchain) if loop.file == f"{files.name}.c"
     }
     lines = files.files[f"{files.name}.c"].split("\n")
-    shading = [
-        number - 1 for number, line in enumerate(lines, 1) if "sample s = shade(" in line and "at + i + left" in line
-    ]
-    assert len(shading) == 1
-    assert found.get(shading[0], 0) >= min(32, toolchain.target(False).vector_bytes), lines[shading[0] - 1]
+    stages = translated(name, level).program.stages
+    text = files.files[f"{files.name}.c"]
+    begin = text[: text.index("void finish(") if stages else text.index("_rows(")].count("\n")
+    end = text[: text.index("/* The bounds for points")].count("\n")
+    called = re.compile(r"^ +stage_\d+\(" if stages else r"sample s = shade\(")
+    shading = [number for number in range(begin, end) if called.search(lines[number])]
+    assert len(shading) == max(1, len(stages)), shading
+    for number in shading:
+        assert found.get(number, 0) >= min(32, toolchain.target(False).vector_bytes), lines[number - 1]
 
 
 # -------------------------------------------------------------------------------------------------------- one frame

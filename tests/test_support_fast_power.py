@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from symrender_cg.functions.fast import fast_tables
+from symrender_cg.functions.fast import bound_lobe_error, fast_tables
 from symrender_cg.functions.fast_header import render_fast_header
 
 Array = NDArray[np.float32]
@@ -117,6 +117,60 @@ def test_logarithm_and_power_of_two_stay_within_their_proved_relative_bounds() -
     y = np.random.default_rng(54).uniform(-125.0, 0.0, 5000).astype(np.float32)
     powers = [flint.arb(2) ** flint.arb(b) for b in y.tolist()]
     assert largest_error(run(EXP2, y), powers, relative=True) <= fast_tables().exp2_bound
+
+
+NARROW = """
+#include "fast_power.h"
+
+void run(const float *cos2, float *y, float *power, double n, int count)
+{
+    fast_powers_of_lobef(cos2, y, power, half_of_large((float)n), count);
+}
+
+double half(double n)
+{
+    return half_of_large((float)n);
+}
+"""
+DECLARED = "void run(const float *, float *, float *, double, int); double half(double);"
+
+
+def narrow(cos2: Any, n: float, compiler: str = "gcc") -> Array:
+    """Powers of cosines by the polynomial for exponents from 32 on."""
+    given = np.ascontiguousarray(np.asarray(cos2, np.float32))
+    room, out = np.empty_like(given), np.empty_like(given)
+    compile_c(NARROW, DECLARED, compiler=compiler).call("run", given, room, out, n, out.size)
+    return out
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_a_power_of_a_large_exponent_stays_within_its_proved_bound_and_comes_near_it(compiler: str) -> None:
+    draw = np.random.default_rng(55)
+    largest = 0.0
+    for n in (32.0, 37.5, 100.0, 999.5, 1e5):
+        lobe = 1.0 - draw.uniform(0.0, 24.0 / n, 600)
+        cos2 = np.clip(np.concatenate([lobe, draw.uniform(0.0, 1.0, 300)]), 0.0, 1.0).astype(np.float32)
+        exact = [flint.arb(b) ** (flint.arb(n) / 2) for b in cos2.tolist()]
+        largest = max(largest, largest_error(narrow(cos2, n, compiler), exact))
+    assert 0.8 * fast_tables().narrow_bound <= largest <= fast_tables().narrow_bound
+
+
+def test_a_large_exponent_is_one_of_at_least_32_and_its_powers_are_in_the_unit_interval() -> None:
+    compiled = compile_c(NARROW, DECLARED)
+    assert [compiled.call("half", n) for n in (0.0, 2.5, 31.99, 32.0, 37.5)] == [0.0, 0.0, 0.0, 16.0, 18.75]
+    for n in (32.0, 1000.0, 1e30, math.inf):
+        assert narrow([1.0, np.nextafter(np.float32(1), np.float32(2)), 1.01], n).tolist() == [1.0, 1.0, 1.0]
+        powers = narrow(np.linspace(0.0, 1.0, 257), n)
+        assert np.all((powers >= 0.0) & (powers <= 1.0))
+        assert np.all(powers[:128] < 1e-4)
+
+
+def test_the_polynomial_of_a_narrow_lobe_has_its_proved_error() -> None:
+    tables = fast_tables()
+    with mpmath.workdps(30):
+        gs = mpmath.linspace(mpmath.mpf(1) / 1000, mpmath.mpf(7) / 16, 801)
+        errors = [abs(g * mpmath.polyval(tables.lobe[::-1], g) * mpmath.log(2) / mpmath.log1p(-g) + 1) for g in gs]
+        assert 0.95 * bound_lobe_error(tables.lobe) <= max(errors) <= bound_lobe_error(tables.lobe)
 
 
 EXPONENTS = [1.4e-45, 1e-30, 1e-3, 0.5, 1.0, 32.0, 1e6, 1e30, 3e38, math.inf]

@@ -13,33 +13,41 @@
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      once: frame 4 mul 3 div 1 sqrt 1 max 1 select 20 call
- *          a row: 1 mul 5 call
- *          a pixel: 28 mul 23 add 2 div 2 sqrt 2 max 2 select 1 call
+ * ops      once: frame 11 mul 3 add 3 div 1 sqrt 1 max 1 select 21 call
+ *          a row: 3 mul 1 add 5 call
+ *          a pixel: 16 mul 17 add 2 div 2 sqrt 2 max 2 select 1 call
  */
 #include "centred_sphere_certified_uint8.h"
 
 #include "inline.h"
 #include "span.h"
 #include "units.h"
+#include "block.h"
 #include "phong_power.h"
 #include "double_double.h"
+#include "whole_power.h"
 #include "exact_sign.h"
 #include "range.h"
 #include "settle.h"
 #include <math.h>
 
-enum { POINTS = 128 };   /* points shaded in one go, before the few doubtful ones among them are settled */
+enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first level cache */
 
 /* What does not change within a frame. */
 typedef struct {
-    double plane_unit, lamp_x, lamp_y, lamp_z, focal, extent_x, extent_y, d_dot_d_frame, along_frame, diffuse_gain,
-        zero_power, specular_gain, k_ambient, shininess;
-    double_double alpha, rho2, depth;
+    int half_exponent;
+    double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp2, extent_x, extent_y, d_dot_d_frame, slope, bend,
+        base_frame, row_dot_lamp_frame, diffuse_gain, k_ambient, shininess;
+    double_double alpha, rho2;
 } frame;
 
 static frame frame_of(const centred_sphere_certified_uint8_scene *scene)
 {
+    /* specular [1 mul 1 select 1 call] */
+    const int half_exponent = half_of_whole(scene->shininess);   /* n / 2 where n is an even whole number, else 0 */
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+    const double specular_gain = scene->k_specular * scene->light_intensity;   /* I_L k_s */
+
     /* units of length, powers of two [5 call] */
     const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
     const double plane_unit = ldexp(1, plane_exponent);
@@ -47,7 +55,7 @@ static frame frame_of(const centred_sphere_certified_uint8_scene *scene)
     const double eye = ldexp(scene->eye, world_exponent);
     const double radius = ldexp(scene->radius, world_exponent);
 
-    /* light [3 div 4 call] */
+    /* light [3 mul 3 add 3 div 4 call] */
     const double from_center_x = scene->light_x;   /* L - C */
     const double from_center_y = scene->light_y;
     const double from_center_z = scene->light_z;
@@ -57,6 +65,7 @@ static frame frame_of(const centred_sphere_certified_uint8_scene *scene)
     const double lamp_x = ldexp(from_center_x, lamp_exponent) / radius;   /* (L - C) / R */
     const double lamp_y = ldexp(from_center_y, lamp_exponent) / radius;
     const double lamp_z = ldexp(from_center_z, lamp_exponent) / radius;
+    const double lamp2 = 1.0 + lamp_x * lamp_x + lamp_y * lamp_y + lamp_z * lamp_z;   /* |lamp|^2 + |n|^2 */
 
     /* silhouette [1 sqrt 1 max 11 call] */
     /* alpha = kappa^2 - 1, free of cancellation */
@@ -68,39 +77,43 @@ static frame frame_of(const centred_sphere_certified_uint8_scene *scene)
     const double_double rho2 = dd_div(dd_product(focal, focal), alpha);
     /* kappa = e / R: lengths of the scene in radii */
     const double_double depth = dd_div(dd_from(eye), dd_from(radius));
-    const double share_2 = sqrt(rho2.hi > 0.0 ? rho2.hi : 0.0);
-    const double extent_x = share_2;   /* no hit is farther from the axis, to the side or up */
-    const double extent_y = share_2;
+    const double share_4 = sqrt(rho2.hi > 0.0 ? rho2.hi : 0.0);
+    const double extent_x = share_4;   /* no hit is farther from the axis, to the side or up */
+    const double extent_y = share_4;
 
     /* ray and sphere [1 mul] */
     const double d_dot_d_frame = focal * focal;   /* what is the same for a frame in d_dot_d */
 
-    /* normal [1 mul] */
-    const double along_frame = focal * depth.hi;   /* what is the same for a frame in along */
+    /* normal [4 mul] */
+    const double share_2 = focal * depth.hi;
+    const double slope = lamp_x * share_2;   /* F = kappa (f x, f y, s): F.lamp = slope x + bend s + base */
+    const double bend = depth.hi * lamp_z;
+    const double base_frame = lamp_y * share_2;   /* what is the same for a frame in base */
+
+    /* light [1 mul] */
+    const double row_dot_lamp_frame = -(focal * lamp_z);   /* what is the same for a frame in row_dot_lamp */
 
     /* diffuse [1 mul] */
     const double diffuse_gain = scene->k_diffuse * scene->light_intensity;   /* I_L k_d */
 
-    /* specular [1 mul 1 select] */
-    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
-    const double specular_gain = scene->k_specular * scene->light_intensity;   /* I_L k_s */
-
     const frame f = {
+        .half_exponent = half_exponent,
+        .zero_power = zero_power,
+        .specular_gain = specular_gain,
         .plane_unit = plane_unit,
         .lamp_x = lamp_x,
         .lamp_y = lamp_y,
-        .lamp_z = lamp_z,
+        .lamp2 = lamp2,
         .alpha = alpha,
-        .focal = focal,
         .rho2 = rho2,
-        .depth = depth,
         .extent_x = extent_x,
         .extent_y = extent_y,
         .d_dot_d_frame = d_dot_d_frame,
-        .along_frame = along_frame,
+        .slope = slope,
+        .bend = bend,
+        .base_frame = base_frame,
+        .row_dot_lamp_frame = row_dot_lamp_frame,
         .diffuse_gain = diffuse_gain,
-        .zero_power = zero_power,
-        .specular_gain = specular_gain,
         .k_ambient = scene->k_ambient,
         .shininess = scene->shininess,
     };
@@ -109,8 +122,8 @@ static frame frame_of(const centred_sphere_certified_uint8_scene *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double y, s_row;
     double_double x_left, x_right;
+    double s_row, base, row_dot_lamp;
 } row;
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
@@ -124,8 +137,14 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     /* ray and sphere [1 mul] */
     const double s_row = y * y;   /* what is the same for a row in s */
 
+    /* normal [1 mul] */
+    const double base = y * f->base_frame;
+
+    /* light [1 mul 1 add] */
+    const double row_dot_lamp = y * f->lamp_y + f->row_dot_lamp_frame;
+
     const row r = {
-        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row,
+        .x_left = x_left, .x_right = x_right, .s_row = s_row, .base = base, .row_dot_lamp = row_dot_lamp,
     };
     return r;
 }
@@ -150,12 +169,9 @@ static inline double certainty(double facing2, double d_dot_d)
     return fabs(facing2) - 0x1p-40 * d_dot_d;
 }
 
-/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
-static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
-    const centred_sphere_certified_uint8_scene *scene)
+/* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
+SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *sure)
 {
-    const double x = column * step;
-
     /* ray and sphere [3 mul 6 add] */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
@@ -166,7 +182,18 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
 
-    return certainty(facing2, d_dot_d) > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+    *sure = certainty(facing2, d_dot_d);
+    return facing2;
+}
+
+/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
+static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
+    const centred_sphere_certified_uint8_scene *scene)
+{
+    double sure;
+    const double facing2 = sight(column * step, r, f, &sure);
+
+    return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
 }
 
 /* ---- how far a value may be off ---- */
@@ -188,13 +215,19 @@ static bounds bounds_of(
     const range x = range_between(-x_most, x_most), y = range_between(-y_most, y_most);
     const double least_cos2 = scene->shininess < 2.0 ? 0x1p-20 : 0.0;
 
+    /* specular [1 select 4 call] */
+    const int half_exponent = half_of_whole(scene->shininess);
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;
+    const range specular_gain = range_product(FLOAT64, range_exact(scene->k_specular),
+        range_exact(scene->light_intensity));
+
     /* units of length, powers of two [4 call] */
     const int plane_exponent = unit_exponent(scene->eye);
     const int world_exponent = unit_exponent(scene->radius);
     const double eye = ldexp(scene->eye, world_exponent);
     const double radius = ldexp(scene->radius, world_exponent);
 
-    /* light [17 call] */
+    /* light [26 call] */
     const double from_center_x = scene->light_x;
     const double from_center_y = scene->light_y;
     const double from_center_z = scene->light_z;
@@ -207,6 +240,11 @@ static bounds bounds_of(
     const range lamp_z = range_blurred(range_quotient(FLOAT64, range_ldexp(range_known(from_center_z), lamp_exponent),
         range_exact(radius)), 0x1p-58);
     const double light_gap2 = range_light_gap2(lamp_x, lamp_y, lamp_z);   /* the least |w|^2: (|lamp| - 1)^2 */
+    const double lamp_length = range_length(lamp_x, lamp_y, lamp_z);   /* the largest |lamp| */
+    const range lamp2 = range_sum(FLOAT64,
+        range_sum(FLOAT64, range_sum(FLOAT64, range_exact(1.0), range_square(FLOAT64, lamp_x)),
+        range_square(FLOAT64, lamp_y)), range_square(FLOAT64, lamp_z));
+    const range d_dot_lamp_odd = range_product(FLOAT64, x, lamp_x);
 
     /* silhouette [1 div 24 call] */
     const range alpha = range_quotient(DOUBLE_DOUBLE,
@@ -235,49 +273,44 @@ static bounds bounds_of(
     const range facing2 = range_within(range_product(FLOAT64, range_high(alpha), chord), SURE_HIT, farthest2);
     const range facing = range_root(FLOAT64, range_positive_part(facing2));
 
-    /* normal [17 call] */
+    /* normal [13 call] */
     const range inv_d2 = range_inverse(FLOAT64, d_dot_d);
-    const range along_frame = range_product(FLOAT64, range_exact(focal), range_high(depth));
-    const range along = range_product(FLOAT64, inv_d2, range_difference(FLOAT64, along_frame, facing));
-    const range n_x = range_within(range_product(FLOAT64, x, along), -1.0, 1.0);
-    const range n_y = range_within(range_product(FLOAT64, y, along), -1.0, 1.0);
-    const range n_z = range_within(range_product(FLOAT64,
-        range_sum(FLOAT64, range_product(FLOAT64, s, range_high(depth)),
-        range_product(FLOAT64, range_exact(focal), facing)), inv_d2), -1.0, 1.0);
+    const range share_2 = range_product(FLOAT64, range_exact(focal), range_high(depth));
+    const range slope = range_product(FLOAT64, lamp_x, share_2);
+    const range bend = range_product(FLOAT64, range_high(depth), lamp_z);
+    const range base_frame = range_product(FLOAT64, lamp_y, share_2);
+    const range base = range_product(FLOAT64, y, base_frame);
+    const range foot_dot_lamp_even = range_sum(FLOAT64, range_product(FLOAT64, s, bend), base);
+    const range foot_dot_lamp_odd = range_product(FLOAT64, x, slope);
+    const range foot_dot_lamp = range_sum(FLOAT64, foot_dot_lamp_even, foot_dot_lamp_odd);
 
-    /* light [18 call] */
-    const range w_x = range_difference(FLOAT64, lamp_x, n_x);
-    const range w_y = range_difference(FLOAT64, lamp_y, n_y);
-    const range w_z = range_difference(FLOAT64, lamp_z, n_z);
-    const range w2 = range_within(range_sum(FLOAT64,
-        range_sum(FLOAT64, range_square(FLOAT64, w_x), range_square(FLOAT64, w_y)), range_square(FLOAT64, w_z)),
-        light_gap2, INFINITY);
+    /* light [20 call] */
+    const range row_dot_lamp_frame = range_neg(range_product(FLOAT64, range_exact(focal), lamp_z));
+    const range row_dot_lamp = range_sum(FLOAT64, range_product(FLOAT64, y, lamp_y), row_dot_lamp_frame);
+    const range d_dot_lamp = range_sum(FLOAT64, row_dot_lamp, d_dot_lamp_odd);
+    const range n_dot_lamp = range_within(range_product(FLOAT64, inv_d2,
+        range_difference(FLOAT64, foot_dot_lamp, range_product(FLOAT64, facing, d_dot_lamp))), -lamp_length,
+        lamp_length);
+    const range share_3 = range_product(FLOAT64, range_exact(2.0), n_dot_lamp);
+    const range w2 = range_within(range_difference(FLOAT64, lamp2, share_3), light_gap2, INFINITY);
     const range inv_w2 = range_inverse(FLOAT64, w2);
-    const range n_dot_l = range_within(range_product(FLOAT64,
-        range_sum(FLOAT64, range_sum(FLOAT64, range_product(FLOAT64, n_x, w_x), range_product(FLOAT64, n_y, w_y)),
-        range_product(FLOAT64, n_z, w_z)), range_root(FLOAT64, inv_w2)), -1.0, 1.0);
+    const range n_dot_l = range_within(range_product(FLOAT64, range_difference(FLOAT64, n_dot_lamp, range_exact(1.0)),
+        range_root(FLOAT64, inv_w2)), -1.0, 1.0);
 
     /* diffuse [5 call] */
     const range diffuse_gain = range_product(FLOAT64, range_exact(scene->k_diffuse),
         range_exact(scene->light_intensity));
     const range diffuse = range_product(FLOAT64, range_positive_part(n_dot_l), diffuse_gain);
 
-    /* specular [1 select 29 call] */
-    const range bounce = range_product(FLOAT64, range_exact(2.0), facing);
-    const range mirror_x = range_sum(FLOAT64, x, range_product(FLOAT64, n_x, bounce));
-    const range mirror_y = range_sum(FLOAT64, y, range_product(FLOAT64, n_y, bounce));
-    const range mirror_z = range_difference(FLOAT64, range_product(FLOAT64, n_z, bounce), range_exact(focal));
-    const range w_dot_mirror = range_sum(FLOAT64,
-        range_sum(FLOAT64, range_product(FLOAT64, w_x, mirror_x), range_product(FLOAT64, w_y, mirror_y)),
-        range_product(FLOAT64, w_z, mirror_z));
+    /* specular [16 call] */
+    const range w_dot_mirror = range_sum(FLOAT64, d_dot_lamp,
+        range_product(FLOAT64, facing, range_difference(FLOAT64, share_3, range_exact(1.0))));
     const range inv_w2_d2 = range_product(FLOAT64, inv_d2, inv_w2);
     const range cos2 = range_within(range_product(FLOAT64, range_square(FLOAT64, w_dot_mirror), inv_w2_d2),
         least_cos2, 1.0);
     const range sin2 = range_within(range_difference(FLOAT64, range_exact(1.0), cos2), 0.0, 1.0);
-    const range highlight = range_power_of_cosine(FLOAT64, cos2, sin2, range_exact(scene->shininess), 0.0, POWER_ERROR);
-    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;
-    const range specular_gain = range_product(FLOAT64, range_exact(scene->k_specular),
-        range_exact(scene->light_intensity));
+    const range highlight = range_lobe(FLOAT64, cos2, sin2, range_exact(scene->shininess), half_exponent, 0.0,
+        POWER_ERROR);
     const range specular = range_product(FLOAT64, range_either(highlight, range_exact(zero_power)), specular_gain);
 
     /* intensity [5 call] */
@@ -297,7 +330,8 @@ static bounds bounds_of(
 
 /* The bounds of a frame where no hit is farther from the axis than these, in the unit of the image plane. */
 static bounds bounds_within(
-    const centred_sphere_certified_uint8_scene *scene, const frame *f, double x_most, double y_most)
+    const centred_sphere_certified_uint8_scene *scene, const frame *f,
+    double x_most, double y_most)
 {
     const double x_extent = f->extent_x * (1.0 + 0x1p-20), y_extent = f->extent_y * (1.0 + 0x1p-20);
     return bounds_of(scene, x_most < x_extent ? x_most : x_extent, y_most < y_extent ? y_most : y_extent);
@@ -305,14 +339,35 @@ static bounds bounds_within(
 
 /* ---- shading ---- */
 
-/* The intensity along a ray that hits, and a bound of its error: 0 where it is exact, INFINITY for an unknown one. */
-typedef struct {
-    double value;
-    double error;
-    double miss;   /* positive where the ray surely misses */
-} sample;
+/* A bound of a value's error, by the quantities that decide its conditions; 0 where it is exact, INFINITY where nothing
+ * is known. */
+SYMRENDER_INLINE double error_of(double facing2, double d_dot_d, double n_dot_l, double w_dot_mirror, const bounds *b)
+{
+    const int is_clear = (facing2 - SURE_HIT * d_dot_d > 0.0)
+        & ((w_dot_mirror <= b->lobe_from) | (w_dot_mirror >= b->lobe_to));
+    /* where it is unlit, the value is the ambient one, exactly */
+    const int is_unlit = (n_dot_l < b->unlit) & (w_dot_mirror < b->no_lobe);
 
-SYMRENDER_INLINE sample shade(double x, const row *r, const frame *f, const bounds *b)
+    return is_clear ? (is_unlit ? 0.0 : b->value) : (double)INFINITY;
+}
+
+/* Does a ray surely miss? */
+SYMRENDER_INLINE int surely_misses(double facing2, double d_dot_d)
+{
+    return -0x1p-40 * d_dot_d - facing2 > 0.0;
+}
+
+/* Values of a block of pixels, from the stages that compute them to those that use them. */
+typedef struct {
+    double facing[POINTS], inv_d2[POINTS], foot_dot_lamp_even[POINTS], foot_dot_lamp_odd[POINTS],
+        d_dot_lamp_odd[POINTS], facing2[POINTS], d_dot_d[POINTS], w2[POINTS], diffuse[POINTS], w_dot_mirror[POINTS],
+        cos2[POINTS], n_dot_l[POINTS], highlight[POINTS], value[POINTS];
+    double error[POINTS];   /* a bound of that of the value: 0 where it is exact, INFINITY for an unknown one */
+} block;
+
+/* Stage 1, the same for x and -x: ray and sphere, normal, light [6 mul 7 add 1 div 1 sqrt 1 max]. Leaves facing,
+ * inv_d2, foot_dot_lamp_even, foot_dot_lamp_odd, d_dot_lamp_odd, facing2, d_dot_d. */
+SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
     /* distance to the two ends of the span, not negative inside it */
@@ -325,100 +380,130 @@ SYMRENDER_INLINE sample shade(double x, const row *r, const frame *f, const boun
     const double d_dot_d = s + f->d_dot_d_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
-    /* normal [6 mul 2 add 1 div] */
+    /* normal [2 mul 1 add 1 div] */
     const double inv_d2 = 1.0 / d_dot_d;
-    const double along = inv_d2 * (f->along_frame - facing);   /* t / R: n = (t x, t y, e (1 - t)) / R */
-    const double n_x = x * along;
-    const double n_y = r->y * along;
-    const double n_z = (s * f->depth.hi + f->focal * facing) * inv_d2;   /* a sum, where e (1 - t) would cancel */
+    const double foot_dot_lamp_even = s * f->bend + r->base;   /* what x and -x share in foot_dot_lamp */
+    const double foot_dot_lamp_odd = x * f->slope;   /* what x and -x share up to the sign in foot_dot_lamp */
 
-    /* light [7 mul 7 add 1 div 1 sqrt] */
-    const double w_x = f->lamp_x - n_x;   /* w = (L - P) / R */
-    const double w_y = f->lamp_y - n_y;
-    const double w_z = f->lamp_z - n_z;
-    const double w2 = w_x * w_x + w_y * w_y + w_z * w_z;   /* |w|^2 */
+    /* light [1 mul] */
+    const double d_dot_lamp_odd = x * f->lamp_x;   /* what x and -x share up to the sign in d_dot_lamp */
+
+    b->facing[i] = facing;
+    b->inv_d2[i] = inv_d2;
+    b->foot_dot_lamp_even[i] = foot_dot_lamp_even;
+    b->foot_dot_lamp_odd[i] = foot_dot_lamp_odd;
+    b->d_dot_lamp_odd[i] = d_dot_lamp_odd;
+    b->facing2[i] = facing2;
+    b->d_dot_d[i] = d_dot_d;
+}
+
+/* Stage 2: normal, light, diffuse, specular [9 mul 7 add 1 div 1 sqrt 1 max]. Leaves w2, diffuse, w_dot_mirror,
+ * cos2, n_dot_l. */
+SYMRENDER_INLINE void stage_2(double side, const row *r, const frame *f, block *b, int i)
+{
+    const double foot_dot_lamp_odd = side * b->foot_dot_lamp_odd[i];
+    const double d_dot_lamp_odd = side * b->d_dot_lamp_odd[i];
+
+    /* normal [1 add] */
+    const double foot_dot_lamp = b->foot_dot_lamp_even[i] + foot_dot_lamp_odd;
+
+    /* light [4 mul 4 add 1 div 1 sqrt] */
+    const double d_dot_lamp = r->row_dot_lamp + d_dot_lamp_odd;   /* D.lamp */
+    /* n.lamp, with n = (F - facing D) / |D|^2 */
+    const double n_dot_lamp = b->inv_d2[i] * (foot_dot_lamp - b->facing[i] * d_dot_lamp);
+    const double share_3 = 2.0 * n_dot_lamp;
+    const double w2 = f->lamp2 - share_3;   /* |w|^2 for w = lamp - n */
     const double inv_w2 = 1.0 / w2;
-    const double n_dot_l = (n_x * w_x + n_y * w_y + n_z * w_z) * sqrt(inv_w2);   /* n.l = n.w / |w| */
+    const double n_dot_l = (n_dot_lamp - 1.0) * sqrt(inv_w2);   /* n.l = n.w / |w| */
 
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
     const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [11 mul 6 add 1 select 1 call]. Phong 1975, Illumination for computer generated pictures */
-    const double bounce = 2.0 * facing;
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double mirror_x = x + n_x * bounce;
-    const double mirror_y = r->y + n_y * bounce;
-    const double mirror_z = n_z * bounce - f->focal;
-    const double w_dot_mirror = w_x * mirror_x + w_y * mirror_y + w_z * mirror_z;   /* r.v = w . mirror / (|w| |D|) */
-    const double inv_w2_d2 = inv_d2 * inv_w2;
+    /* specular [4 mul 2 add] */
+    /* r.v = w . mirror / (|w| |D|), mirror = D + 2 facing n */
+    const double w_dot_mirror = d_dot_lamp + b->facing[i] * (share_3 - 1.0);
+    const double inv_w2_d2 = b->inv_d2[i] * inv_w2;
     const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const double sin2 = 1.0 - cos2;   /* 1 - (r.v)^2 as a difference: what cancels is paid for */
-    const double highlight = power_of_cosine(cos2, sin2, f->shininess);   /* max(0, r.v)^n where r.v > 0 */
+
+    b->w2[i] = w2;
+    b->diffuse[i] = diffuse;
+    b->w_dot_mirror[i] = w_dot_mirror;
+    b->cos2[i] = cos2;
+    b->n_dot_l[i] = n_dot_l;
+}
+
+/* Stage 3: specular [1 add 1 call]. Leaves highlight. */
+SYMRENDER_INLINE void stage_3(const frame *f, block *b, int i)
+{
+    /* specular [1 add 1 call]. Phong 1975, Illumination for computer generated pictures */
+    const double sin2 = 1.0 - b->cos2[i];   /* 1 - (r.v)^2 as a difference: what cancels is paid for */
+    const double highlight = power_of_cosine(b->cos2[i], sin2, f->shininess);   /* max(0, r.v)^n where r.v > 0 */
+
+    b->highlight[i] = highlight;
+}
+
+/* Stage 4: specular, intensity [1 mul 2 add 2 select]. Leaves value. */
+SYMRENDER_INLINE void stage_4(const frame *f, block *b, int i)
+{
+    const double highlight = b->highlight[i];
+    const double zero_power = f->zero_power;
+
+    /* specular [1 mul 1 select]. Phong 1975, Illumination for computer generated pictures */
     /* k_s max(0, r.v)^n */
-    const double specular = (w_dot_mirror > 0.0 ? highlight : f->zero_power) * f->specular_gain;
+    const double specular = (b->w_dot_mirror[i] > 0.0 ? highlight : zero_power) * f->specular_gain;
 
     /* intensity [2 add 1 select]. Phong 1975, Illumination for computer generated pictures */
-    const double lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
-    const double value = f->k_ambient + (w2 > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
+    const double lit = b->diffuse[i] + specular;   /* what the light adds; the gains hold its intensity */
+    const double value = f->k_ambient + (b->w2[i] > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
 
-    /* conditions that are decided */
-    const double sure = facing2 - SURE_HIT * d_dot_d;
-    const int is_clear = (sure > 0.0)
-        & ((w_dot_mirror <= b->lobe_from) | (w_dot_mirror >= b->lobe_to));
-    /* where it is unlit, the value is the ambient one, exactly */
-    const int is_unlit = (n_dot_l < b->unlit) & (w_dot_mirror < b->no_lobe);
-
-    const sample taken = {
-        .value = value,
-        .error = is_clear ? (is_unlit ? 0.0 : b->value) : (double)INFINITY,
-        .miss = -0x1p-40 * d_dot_d - facing2,
-    };
-    return taken;
+    b->value[i] = value;
 }
 
-/* Values of a block of points, up to their bounds. */
-typedef struct {
-    double value[POINTS];
-    double error[POINTS];
-} block;
-
-SYMRENDER_INLINE void keep(block *b, int i, const sample *s)
+/* The stages that differ between x and -x, for pixels right (side 1) or left (side -1) of the middle of the row. */
+SYMRENDER_INLINE void finish(double side, int count, const row *r, const frame *f, block *b)
 {
-    b->value[i] = s->value;
-    b->error[i] = s->error;
+    for (int i = 0; i < count; ++i)
+        stage_2(side, r, f, b, i);
+    if (f->half_exponent > 0) {
+        whole_powers_of_square(b->cos2, b->highlight, f->half_exponent, count);
+    } else {
+        for (int i = 0; i < count; ++i)
+            stage_3(f, b, i);
+    }
+    for (int i = 0; i < count; ++i)
+        stage_4(f, b, i);
 }
 
-/* The same where the ray may miss: then the value is the background's, exactly. */
-SYMRENDER_INLINE void keep_or_miss(block *b, int i, const sample *s, double background)
+/* Bounds of the errors of a block of values. */
+SYMRENDER_INLINE void judge(block *b, int count, const bounds *limits)
 {
-    keep(b, i, s);
-    const int is_miss = s->miss > 0.0;
-    b->value[i] = is_miss ? background : b->value[i];
-    b->error[i] = is_miss ? 0.0 : b->error[i];
+    for (int i = 0; i < count; ++i)
+        b->error[i] = error_of(b->facing2[i], b->d_dot_d[i], b->n_dot_l[i], b->w_dot_mirror[i], limits);
 }
 
-/* Writes the grey levels of the true values, as far as the bounds show them to be that, and the
- * numbers, from `first` on, of the points where they do not. Returns how many those are. */
-static ptrdiff_t settle(const block *b, int count, unsigned char *restrict out,
+/* Writes the grey levels of the true values, as far as the bounds show them to be that, and
+ * the numbers of the points where they do not, from `first` on or back. Returns how many those are. `forth` is 1 or -1:
+ * value k goes to out[k forth]; the first `passed` values are passed over. */
+SYMRENDER_INLINE ptrdiff_t settle(const block *b, int passed, int count, unsigned char *restrict out, int forth,
     ptrdiff_t first, ptrdiff_t *unsettled)
 {
     int settled[POINTS], some = 0;
     int level[POINTS];   /* bytes later: a loop that writes them takes 64 points at a time, and has many left over */
-    for (int i = 0; i < count; ++i) {
+    for (int i = passed; i < count; ++i) {
         const grey found = grey_level(b->value[i]);
         const int is_settled = (found.distance > 255.0 * b->error[i] + 0x1p-44) | (b->error[i] == 0.0);
         level[i] = (int)found.level;
         settled[i] = is_settled;
         some += !is_settled;
     }
-    for (int i = 0; i < count; ++i)
-        out[i] = (unsigned char)level[i];
+    for (int i = passed; i < count; ++i)
+        out[forth * i] = (unsigned char)level[i];
     if (some == 0)
         return 0;
     ptrdiff_t listed = 0;
-    for (int i = 0; i < count; ++i)
+    for (int i = passed; i < count; ++i)
         if (!settled[i])
-            unsettled[listed++] = first + i;
+            unsettled[listed++] = first + forth * i;
     return listed;
 }
 
@@ -443,37 +528,42 @@ ptrdiff_t centred_sphere_certified_uint8_rows(
     const bounds b = bounds_within(scene, &f, 0.5 * width * step, 0.5 * grid->height * step);
     const unsigned char background = (unsigned char)grey_level(scene->background).level;
     ptrdiff_t found = 0;
+    block values SYMRENDER_ALIGNED;
+    row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
         unsigned char *restrict out = image + j * stride;
         const double plane_y = (top - j) * pixel;
-        const row r = row_of(plane_y * unit, &f);
+        const row r = next;
+        next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
 
-        /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
-        const double left_end = r.x_left.hi / step - left, right_end = r.x_right.hi / step - left;
-        pixel_span hits = span_between(left_end, right_end, width);
-        while (hits.first > 0 && is_hit(hits.first - 1 + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.first;
-        while (hits.last < width - 1 && is_hit(hits.last + 1 + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.last;
-        while (hits.first <= hits.last && !is_hit(hits.first + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.first;
-        while (hits.last >= hits.first && !is_hit(hits.last + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.last;
+        /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
+         * closed form and settled by an exact test */
+        int last = span_between(0.0, r.x_right.hi / step - left, width).last;
+        while (last < width - 1 && is_hit(last + 1 + left, plane_y, &r, &f, pixel, step, scene))
+            ++last;
+        while (last >= width / 2 && !is_hit(last + left, plane_y, &r, &f, pixel, step, scene))
+            --last;
 
-        const int begin = hits.first <= hits.last ? hits.first : width;
-        const int end = hits.first <= hits.last ? hits.last + 1 : width;
+        const int end = last >= width / 2 ? last + 1 : width;
+        const int begin = last >= width / 2 ? width - end : width;
         for (int i = 0; i < begin; ++i)
             out[i] = background;
-        for (int at = begin, count; at < end; at += count) {
+        /* the right half of the span, and pixel by pixel its mirror image */
+        for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
-            block values;
-            for (int i = 0; i < count; ++i) {
-                const sample s = shade((at + i + left) * step, &r, &f, &b);
-                keep(&values, i, &s);
-            }
-            found += settle(&values, count, out + at,
-                (ptrdiff_t)j * width + at, unsettled + found);
+            const int vectors = whole_vectors(count);
+            const int middle = 2 * at + 1 == width;   /* it is its own mirror image */
+            const int mirrored = width - 1 - at;
+            for (int i = 0; i < vectors; ++i)
+                stage_1((at + i + left) * step, &r, &f, &values, i);
+            finish(1.0, vectors, &r, &f, &values);
+            judge(&values, vectors, &b);
+            found += settle(&values, 0, count, out + at, 1, (ptrdiff_t)j * width + at, unsettled + found);
+            finish(-1.0, vectors, &r, &f, &values);
+            judge(&values, vectors, &b);
+            found += settle(&values, middle, count, out + mirrored, -1, (ptrdiff_t)j * width + mirrored,
+                unsettled + found);
         }
         for (int i = end; i < width; ++i)
             out[i] = background;
@@ -495,14 +585,31 @@ static bounds bounds_at(const centred_sphere_certified_uint8_scene *scene, const
 }
 
 /* A block of points, whose rays may miss. */
-SYMRENDER_INLINE void shade_block(block *found, const double *x, const double *y, int count, const frame *f,
-    const bounds *b, double background)
+SYMRENDER_INLINE void shade_block(block *found, const double *restrict block_x, const double *restrict block_y,
+    int length, const frame *f, const bounds *limits, double background)
 {
     const double unit = f->plane_unit;
-    for (int i = 0; i < count; ++i) {
-        const row r = row_of(y[i] * unit, f);
-        const sample s = shade(x[i] * unit, &r, f, b);
-        keep_or_miss(found, i, &s, background);
+    for (int i = 0; i < length; ++i) {
+        const row r = row_of(block_y[i] * unit, f);
+        stage_1(block_x[i] * unit, &r, f, found, i);
+    }
+    for (int i = 0; i < length; ++i) {
+        const row r = row_of(block_y[i] * unit, f);
+        stage_2(1.0, &r, f, found, i);
+    }
+    if (f->half_exponent > 0) {
+        whole_powers_of_square(found->cos2, found->highlight, f->half_exponent, length);
+    } else {
+        for (int i = 0; i < length; ++i)
+            stage_3(f, found, i);
+    }
+    for (int i = 0; i < length; ++i)
+        stage_4(f, found, i);
+    judge(found, length, limits);
+    for (int i = 0; i < length; ++i) {
+        const int is_miss = surely_misses(found->facing2[i], found->d_dot_d[i]);
+        found->value[i] = is_miss ? background : found->value[i];
+        found->error[i] = is_miss ? 0.0 : found->error[i];
     }
 }
 
@@ -516,10 +623,9 @@ ptrdiff_t centred_sphere_certified_uint8_points(
     ptrdiff_t found = 0;
     for (ptrdiff_t at = 0; at < count; at += POINTS) {
         const int length = count - at < POINTS ? (int)(count - at) : POINTS;
-        block values_here;
+        block values_here SYMRENDER_ALIGNED;
         shade_block(&values_here, x + at, y + at, length, &f, &b, scene->background);
-        found += settle(&values_here, length, values + at, at,
-            unsettled + found);
+        found += settle(&values_here, 0, length, values + at, 1, at, unsettled + found);
     }
     return found;
 }
@@ -532,7 +638,7 @@ void centred_sphere_certified_uint8_enclose(
     const bounds b = bounds_at(scene, &f, x, y, count);
     for (ptrdiff_t at = 0; at < count; at += POINTS) {
         const int length = count - at < POINTS ? (int)(count - at) : POINTS;
-        block values_here;
+        block values_here SYMRENDER_ALIGNED;
         shade_block(&values_here, x + at, y + at, length, &f, &b, scene->background);
         for (int i = 0; i < length; ++i) {
             hi[at + i] = values_here.value[i];
@@ -540,4 +646,25 @@ void centred_sphere_certified_uint8_enclose(
             error[at + i] = values_here.error[i];
         }
     }
+}
+
+ptrdiff_t centred_sphere_certified_uint8_batch(
+    unsigned char *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const centred_sphere_certified_uint8_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled)
+{
+    const ptrdiff_t height = grids->height, pixels = height * grids->width;
+    ptrdiff_t found = 0;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : (int)height;
+        const ptrdiff_t listed = centred_sphere_certified_uint8_rows(
+            images + k * image_stride, stride, &grids[k], &scenes[k], begin, end, unsettled + found);
+        for (ptrdiff_t i = 0; i < listed; ++i)
+            unsettled[found + i] += k * pixels;
+        found += listed;
+    }
+    return found;
 }

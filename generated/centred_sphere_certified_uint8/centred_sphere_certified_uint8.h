@@ -51,6 +51,14 @@ void centred_sphere_certified_uint8_enclose(
 double centred_sphere_certified_uint8_bound(
     const symrender_grid *grid, const centred_sphere_certified_uint8_scene *scene);
 
+/* Writes rows [row_begin, row_end) of many images of one size, counted through: row j of image k is row k * height + j
+ * and starts at images + k * image_stride + j * stride. Each image has its own scene and grid. `unsettled`, and what is
+ * returned, as for rows, with the pixels counted through: (k * height + row) * width + column. */
+ptrdiff_t centred_sphere_certified_uint8_batch(
+    unsigned char *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const centred_sphere_certified_uint8_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled);
+
 #ifdef __cplusplus
 }
 #endif

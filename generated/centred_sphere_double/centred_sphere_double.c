@@ -13,10 +13,10 @@
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      once: frame 4 mul 3 div 1 select 21 call
+ * ops      once: frame 5 mul 3 div 1 select 23 call
  *          a row: 1 mul 5 call
- *          a pixel: 38 mul 27 add 2 div 2 sqrt 2 max 2 select 2 call
- *          of these, once for two of them, at x and -x: 24 mul 17 add 1 div 1 sqrt 1 max
+ *          a pixel: 43 mul 31 add 2 div 2 sqrt 2 max 3 select 2 call
+ *          of these, once for two of them, at x and -x: 25 mul 18 add 1 div 1 sqrt 1 max 1 select
  */
 #include "centred_sphere_double.h"
 
@@ -34,9 +34,9 @@ enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first lev
 /* What does not change within a frame. */
 typedef struct {
     int half_exponent;
-    double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, along_frame,
-        diffuse_gain, k_ambient, shininess;
-    double_double alpha, rho2, depth;
+    double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, middle_s, facing2_middle_frame,
+        along_frame, diffuse_gain, k_ambient, shininess;
+    double_double alpha, rho2, depth, depth2, depth_focal;
 } frame;
 
 static frame frame_of(const centred_sphere_double_scene *scene)
@@ -64,25 +64,30 @@ static frame frame_of(const centred_sphere_double_scene *scene)
     const double lamp_y = ldexp(from_center_y, lamp_exponent) / radius;
     const double lamp_z = ldexp(from_center_z, lamp_exponent) / radius;
 
-    /* silhouette [11 call] */
+    /* silhouette [1 mul 11 call] */
+    /* rays D = (x, y, -f): f is e, in the unit of the image plane */
+    const double focal = ldexp(scene->eye, plane_exponent);
     /* alpha = kappa^2 - 1, free of cancellation */
     const double_double alpha = dd_div(dd_mul(dd_difference(eye, radius), dd_sum(eye, radius)),
         dd_product(radius, radius));
-    /* rays D = (x, y, -f): f is e, in the unit of the image plane */
-    const double focal = ldexp(scene->eye, plane_exponent);
     /* the silhouette is the circle x^2 + y^2 = rho^2 = f^2 / alpha */
     const double_double rho2 = dd_div(dd_product(focal, focal), alpha);
+    const double middle_s = 0.5 * rho2.hi;   /* where the angle of incidence is 45 degrees */
     /* kappa = e / R: lengths of the scene in radii */
     const double_double depth = dd_div(dd_from(eye), dd_from(radius));
 
     /* ray and sphere [1 mul] */
-    const double d_dot_d_frame = focal * focal;   /* what is the same for a frame in d_dot_d */
+    const double facing2_middle_frame = focal * focal;   /* what is the same for a frame in facing2_middle */
 
     /* normal [1 mul] */
     const double along_frame = focal * depth.hi;   /* what is the same for a frame in along */
 
     /* diffuse [1 mul] */
     const double diffuse_gain = scene->k_diffuse * scene->light_intensity;   /* I_L k_d */
+
+    /* specular [2 call] */
+    const double_double depth2 = dd_mul(depth, depth);
+    const double_double depth_focal = dd_mul_double(depth, focal);
 
     const frame f = {
         .half_exponent = half_exponent,
@@ -92,13 +97,16 @@ static frame frame_of(const centred_sphere_double_scene *scene)
         .lamp_x = lamp_x,
         .lamp_y = lamp_y,
         .lamp_z = lamp_z,
-        .alpha = alpha,
         .focal = focal,
+        .alpha = alpha,
         .rho2 = rho2,
+        .middle_s = middle_s,
         .depth = depth,
-        .d_dot_d_frame = d_dot_d_frame,
+        .facing2_middle_frame = facing2_middle_frame,
         .along_frame = along_frame,
         .diffuse_gain = diffuse_gain,
+        .depth2 = depth2,
+        .depth_focal = depth_focal,
         .k_ambient = scene->k_ambient,
         .shininess = scene->shininess,
     };
@@ -113,17 +121,17 @@ typedef struct {
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
 {
+    /* ray and sphere [1 mul] */
+    const double s_row = y * y;   /* what is the same for a row in s */
+
     /* silhouette [5 call] */
     /* the row's hits are -reach <= x <= reach */
     const double_double reach = dd_sqrt(dd_positive_part(dd_sub(f->rho2, dd_product(y, y))));
     const double_double x_left = dd_neg(reach);
     const double_double x_right = reach;
 
-    /* ray and sphere [1 mul] */
-    const double s_row = y * y;   /* what is the same for a row in s */
-
     const row r = {
-        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row,
+        .y = y, .s_row = s_row, .x_left = x_left, .x_right = x_right,
     };
     return r;
 }
@@ -151,15 +159,18 @@ static inline double certainty(double facing2, double d_dot_d)
 /* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
 SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *sure)
 {
-    /* ray and sphere [3 mul 6 add] */
+    /* ray and sphere [4 mul 8 add 1 select] */
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    /* disc / R^2 where that takes little from f^2 */
+    const double facing2_middle = f->facing2_middle_frame - s * f->alpha.hi;
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    const double d_dot_d = s + f->d_dot_d_frame;
+    const double facing2_edge = f->alpha.hi * chord;
+    const double facing2 = f->middle_s - s > 0.0 ? facing2_middle : facing2_edge;
+    const double d_dot_d = s + f->facing2_middle_frame;
 
     *sure = certainty(facing2, d_dot_d);
     return facing2;
@@ -177,25 +188,28 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
 
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
-    double x[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS], n_dot_l_even[POINTS],
-        mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS], w_dot_mirror_even[POINTS], side_y_odd[POINTS],
-        side_z_odd[POINTS], sin2_even[POINTS], w2[POINTS], diffuse[POINTS], w_dot_mirror[POINTS], cos2[POINTS],
+    double x[POINTS], s[POINTS], facing2[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w_y[POINTS], w_z[POINTS],
+        w2_even[POINTS], n_dot_l_even[POINTS], mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS],
+        w_dot_mirror_even[POINTS], inv_d6[POINTS], w2[POINTS], diffuse[POINTS], w_dot_mirror[POINTS], cos2[POINTS],
         sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
 } block;
 
-/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 6 add 1 div 1 sqrt 1 max]. Leaves x, s, facing,
- * inv_d2. */
+/* Stage 1, the same for x and -x: ray and sphere, normal [4 mul 8 add 1 div 1 sqrt 1 max 1 select]. Leaves x, s,
+ * facing2, facing, inv_d2. */
 SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
-    /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
+    /* ray and sphere [4 mul 8 add 1 sqrt 1 max 1 select] */
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    /* disc / R^2 where that takes little from f^2 */
+    const double facing2_middle = f->facing2_middle_frame - s * f->alpha.hi;
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    const double d_dot_d = s + f->d_dot_d_frame;
+    const double facing2_edge = f->alpha.hi * chord;
+    const double facing2 = f->middle_s - s > 0.0 ? facing2_middle : facing2_edge;
+    const double d_dot_d = s + f->facing2_middle_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
     /* normal [1 div] */
@@ -203,20 +217,21 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, 
 
     b->x[i] = x;
     b->s[i] = s;
+    b->facing2[i] = facing2;
     b->facing[i] = facing;
     b->inv_d2[i] = inv_d2;
 }
 
-/* Stage 2, the same for x and -x: normal, light, specular [21 mul 11 add]. Leaves n_x, w2_even, n_dot_l_even,
- * mirror_x, mirror_y, mirror_z, w_dot_mirror_even, side_y_odd, side_z_odd, sin2_even. */
+/* Stage 2, the same for x and -x: normal, light, specular [21 mul 10 add]. Leaves n_x, w_y, w_z, w2_even,
+ * n_dot_l_even, mirror_x, mirror_y, mirror_z, w_dot_mirror_even, inv_d6. */
 SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
 {
     /* normal [6 mul 2 add] */
     const double along = b->inv_d2[i] * (f->along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
     const double n_x = b->x[i] * along;
     const double n_y = r->y * along;
-    /* a sum, where e (1 - t) would cancel */
-    const double n_z = (b->s[i] * f->depth.hi + f->focal * b->facing[i]) * b->inv_d2[i];
+    const double share_1 = b->s[i] * f->depth.hi;
+    const double n_z = b->inv_d2[i] * (f->focal * b->facing[i] + share_1);   /* a sum, where e (1 - t) would cancel */
 
     /* light [4 mul 4 add] */
     const double w_y = f->lamp_y - n_y;
@@ -224,37 +239,37 @@ SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
     const double w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
     const double n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
 
-    /* specular [11 mul 5 add] */
+    /* specular [11 mul 4 add] */
     const double bounce = 2.0 * b->facing[i];
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double mirror_x = b->x[i] + n_x * bounce;
-    const double mirror_y = r->y + n_y * bounce;
-    const double mirror_z = n_z * bounce - f->focal;
+    const double gap2 = b->s[i] * f->depth2.hi;   /* |m x D|^2 in radii = |D|^2 - facing^2, free of cancellation */
+    const double turn = gap2 - b->facing2[i];   /* -|D|^2 cos 2a, a the angle of incidence */
+    const double spread = turn + bounce * f->depth_focal.hi;
+    /* the primary ray mirrored at the surface, times |D|^2: turn D + bounce F, F = kappa (f x, f y, s) */
+    const double mirror_x = b->x[i] * spread;
+    const double mirror_y = r->y * spread;
+    const double mirror_z = share_1 * bounce - f->focal * turn;
     const double w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
-    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
-    const double side_y_odd = w_z * mirror_x;   /* what x and -x share up to the sign in side_y */
-    const double side_z_odd = -(w_y * mirror_x);   /* what x and -x share up to the sign in side_z */
-    const double sin2_even = side_x * side_x;   /* what x and -x share in sin2 */
+    const double inv_d4 = b->inv_d2[i] * b->inv_d2[i];
+    const double inv_d6 = b->inv_d2[i] * inv_d4;   /* 1 / |mirror|^2 */
 
     b->n_x[i] = n_x;
+    b->w_y[i] = w_y;
+    b->w_z[i] = w_z;
     b->w2_even[i] = w2_even;
     b->n_dot_l_even[i] = n_dot_l_even;
     b->mirror_x[i] = mirror_x;
     b->mirror_y[i] = mirror_y;
     b->mirror_z[i] = mirror_z;
     b->w_dot_mirror_even[i] = w_dot_mirror_even;
-    b->side_y_odd[i] = side_y_odd;
-    b->side_z_odd[i] = side_z_odd;
-    b->sin2_even[i] = sin2_even;
+    b->inv_d6[i] = inv_d6;
 }
 
-/* Stage 3: light, diffuse, specular [13 mul 8 add 1 div 1 sqrt 1 max]. Leaves w2, diffuse, w_dot_mirror, cos2, sin2. */
+/* Stage 3: light, diffuse, specular [17 mul 11 add 1 div 1 sqrt 1 max]. Leaves w2, diffuse, w_dot_mirror, cos2,
+ * sin2. */
 SYMRENDER_INLINE void stage_3(double side, const frame *f, block *b, int i)
 {
     const double n_x = side * b->n_x[i];
     const double mirror_x = side * b->mirror_x[i];
-    const double side_y_odd = side * b->side_y_odd[i];
-    const double side_z_odd = side * b->side_z_odd[i];
 
     /* light [3 mul 3 add 1 div 1 sqrt] */
     const double w_x = f->lamp_x - n_x;   /* w = (L - P) / R */
@@ -265,14 +280,19 @@ SYMRENDER_INLINE void stage_3(double side, const frame *f, block *b, int i)
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
     const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [9 mul 5 add] */
-    const double w_dot_mirror = w_x * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|) */
-    const double inv_w2_d2 = b->inv_d2[i] * inv_w2;
-    const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const double side_y = side_y_odd - w_x * b->mirror_z[i];
-    const double side_z = w_x * b->mirror_y[i] + side_z_odd;
-    /* 1 - (r.v)^2, accurate where r.v is near 1 */
-    const double sin2 = inv_w2_d2 * (side_y * side_y + side_z * side_z + b->sin2_even[i]);
+    /* specular [13 mul 8 add] */
+    const double w_dot_mirror = w_x * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|^3) */
+    const double along_w = inv_w2 * w_dot_mirror;   /* mirror = along_w w + across */
+    const double near_cos2 = w_dot_mirror * along_w * b->inv_d6[i];   /* (r.v)^2, but for its scale */
+    /* what of mirror is at right angles to w, short where the highlight is */
+    const double across_x = mirror_x - w_x * along_w;
+    const double across_y = b->mirror_y[i] - b->w_y[i] * along_w;
+    const double across_z = b->mirror_z[i] - b->w_z[i] * along_w;
+    const double near_sin2 = b->inv_d6[i] * (across_x * across_x + across_y * across_y + across_z * across_z);
+    /* 1 / (cos^2 + sin^2): 2 - a is 1 / a where a is within rounding of 1 */
+    const double rescale = 2.0 - near_cos2 - near_sin2;
+    const double cos2 = near_cos2 * rescale;   /* (r.v)^2 */
+    const double sin2 = near_sin2 * rescale;   /* 1 - (r.v)^2, accurate where r.v is near 1 */
 
     b->w2[i] = w2;
     b->diffuse[i] = diffuse;
@@ -370,7 +390,11 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
         const int begin = last >= width / 2 ? width - end : width;
         if (j + 1 < row_end)
             fetch_ahead(out + stride, (size_t)width * sizeof *out);
-        for (int i = 0; i < begin; ++i)
+        /* the background, in whole vectors: it may run into the hits, which are written over it */
+        const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
+        for (int i = 0; i < before; ++i)
+            out[i] = background;
+        for (int i = vectors_begin(end); i < width; ++i)
             out[i] = background;
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
@@ -387,8 +411,6 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
             for (int i = 0; i < count; ++i)
                 out[width - 1 - at - i] = at_most(b.value[i], white);
         }
-        for (int i = end; i < width; ++i)
-            out[i] = background;
     }
 }
 

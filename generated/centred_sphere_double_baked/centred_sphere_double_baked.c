@@ -14,10 +14,10 @@
  *          not, diffuse is 0
  * baked    eye 4, radius 1, light_intensity 1, k_ambient 0.1, k_diffuse 0.7, k_specular 0.5, shininess 32,
  *          background 0, center_x 0, light_x 5, center_y 0, light_y 5, center_z 0, light_z 10
- * ops      at build time: frame 3 call
+ * ops      at build time: frame 5 call
  *          a row: 1 mul 5 call
- *          a pixel: 37 mul 28 add 2 div 2 sqrt 2 max 3 select 4 call
- *          of these, once for two of them, at x and -x: 23 mul 17 add 1 div 1 sqrt 1 max
+ *          a pixel: 41 mul 32 add 2 div 2 sqrt 2 max 4 select 4 call
+ *          of these, once for two of them, at x and -x: 23 mul 18 add 1 div 1 sqrt 1 max 1 select
  */
 #include "centred_sphere_double_baked.h"
 
@@ -37,12 +37,15 @@ static const double plane_unit = 0.25;
 static const double_double alpha = {15.0, 0.0};   /* alpha = kappa^2 - 1, free of cancellation */
 /* the silhouette is the circle x^2 + y^2 = rho^2 = f^2 / alpha */
 static const double_double rho2 = {0.06666666666666667, 9.251858538542971e-19};
+static const double middle_s = 0.03333333333333333;   /* where the angle of incidence is 45 degrees */
 static const double_double depth = {4.0, 0.0};   /* kappa = e / R: lengths of the scene in radii */
 static const double along_frame = 4.0;   /* what is the same for a frame in along */
 static const double lamp_x = 5.0;   /* (L - C) / R */
 static const double lamp_y = 5.0;
 static const double lamp_z = 10.0;
 static const double diffuse_gain = 0.7;   /* I_L k_d */
+static const double_double depth2 = {16.0, 0.0};
+static const double_double depth_focal = {4.0, 0.0};
 static const double specular_gain = 0.5;   /* I_L k_s */
 
 /* What does not change within a row. */
@@ -53,17 +56,17 @@ typedef struct {
 
 SYMRENDER_INLINE row row_of(double y)
 {
+    /* ray and sphere [1 mul] */
+    const double s_row = y * y;   /* what is the same for a row in s */
+
     /* silhouette [5 call] */
     /* the row's hits are -reach <= x <= reach */
     const double_double reach = dd_sqrt(dd_positive_part(dd_sub(rho2, dd_product(y, y))));
     const double_double x_left = dd_neg(reach);
     const double_double x_right = reach;
 
-    /* ray and sphere [1 mul] */
-    const double s_row = y * y;   /* what is the same for a row in s */
-
     const row r = {
-        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row,
+        .y = y, .s_row = s_row, .x_left = x_left, .x_right = x_right,
     };
     return r;
 }
@@ -91,14 +94,16 @@ static inline double certainty(double facing2, double d_dot_d)
 /* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
 SYMRENDER_INLINE double sight(double x, const row *r, double *sure)
 {
-    /* ray and sphere [3 mul 6 add] */
+    /* ray and sphere [4 mul 8 add 1 select] */
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double facing2_middle = 1.0 - s * alpha.hi;   /* disc / R^2 where that takes little from f^2 */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double facing2_edge = alpha.hi * chord;
+    const double facing2 = middle_s - s > 0.0 ? facing2_middle : facing2_edge;
     const double d_dot_d = s + 1.0;
 
     *sure = certainty(facing2, d_dot_d);
@@ -116,44 +121,47 @@ static int is_hit(double column, double plane_y, const row *r, double pixel, dou
 
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
-    double x[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS], n_dot_l_even[POINTS],
-        mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS], w_dot_mirror_even[POINTS], side_y_odd[POINTS],
-        side_z_odd[POINTS], sin2_even[POINTS], value[POINTS];
+    double x[POINTS], s[POINTS], facing2[POINTS], d_dot_d[POINTS], facing[POINTS], n_x[POINTS], w_y[POINTS],
+        w_z[POINTS], w2_even[POINTS], n_dot_l_even[POINTS], mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS],
+        w_dot_mirror_even[POINTS], inv_d6[POINTS], w_x[POINTS], w2[POINTS], inv_w2[POINTS], diffuse[POINTS],
+        value[POINTS];
 } block;
 
-/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 6 add 1 div 1 sqrt 1 max]. Leaves x, s, facing,
- * inv_d2. */
+/* Stage 1, the same for x and -x: ray and sphere [4 mul 8 add 1 sqrt 1 max 1 select]. Leaves x, s, facing2, d_dot_d,
+ * facing. */
 SYMRENDER_INLINE void stage_1(double x, const row *r, block *b, int i)
 {
-    /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
+    /* ray and sphere [4 mul 8 add 1 sqrt 1 max 1 select] */
+    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double facing2_middle = 1.0 - s * alpha.hi;   /* disc / R^2 where that takes little from f^2 */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double facing2_edge = alpha.hi * chord;
+    const double facing2 = middle_s - s > 0.0 ? facing2_middle : facing2_edge;
     const double d_dot_d = s + 1.0;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
-    /* normal [1 div] */
-    const double inv_d2 = 1.0 / d_dot_d;
-
     b->x[i] = x;
     b->s[i] = s;
+    b->facing2[i] = facing2;
+    b->d_dot_d[i] = d_dot_d;
     b->facing[i] = facing;
-    b->inv_d2[i] = inv_d2;
 }
 
-/* Stage 2, the same for x and -x: normal, light, specular [20 mul 11 add]. Leaves n_x, w2_even, n_dot_l_even,
- * mirror_x, mirror_y, mirror_z, w_dot_mirror_even, side_y_odd, side_z_odd, sin2_even. */
+/* Stage 2, the same for x and -x: normal, light, specular [19 mul 10 add 1 div]. Leaves n_x, w_y, w_z, w2_even,
+ * n_dot_l_even, mirror_x, mirror_y, mirror_z, w_dot_mirror_even, inv_d6. */
 SYMRENDER_INLINE void stage_2(const row *r, block *b, int i)
 {
-    /* normal [5 mul 2 add] */
-    const double along = b->inv_d2[i] * (along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    /* normal [5 mul 2 add 1 div] */
+    const double inv_d2 = 1.0 / b->d_dot_d[i];
+    const double along = inv_d2 * (along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
     const double n_x = b->x[i] * along;
     const double n_y = r->y * along;
-    const double n_z = (b->s[i] * depth.hi + b->facing[i]) * b->inv_d2[i];   /* a sum, where e (1 - t) would cancel */
+    const double share_1 = b->s[i] * depth.hi;
+    const double n_z = inv_d2 * (b->facing[i] + share_1);   /* a sum, where e (1 - t) would cancel */
 
     /* light [4 mul 4 add] */
     const double w_y = lamp_y - n_y;
@@ -161,37 +169,35 @@ SYMRENDER_INLINE void stage_2(const row *r, block *b, int i)
     const double w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
     const double n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
 
-    /* specular [11 mul 5 add] */
+    /* specular [10 mul 4 add] */
     const double bounce = 2.0 * b->facing[i];
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double mirror_x = b->x[i] + n_x * bounce;
-    const double mirror_y = r->y + n_y * bounce;
-    const double mirror_z = n_z * bounce - 1.0;
+    const double gap2 = b->s[i] * depth2.hi;   /* |m x D|^2 in radii = |D|^2 - facing^2, free of cancellation */
+    const double turn = gap2 - b->facing2[i];   /* -|D|^2 cos 2a, a the angle of incidence */
+    const double spread = turn + bounce * depth_focal.hi;
+    /* the primary ray mirrored at the surface, times |D|^2: turn D + bounce F, F = kappa (f x, f y, s) */
+    const double mirror_x = b->x[i] * spread;
+    const double mirror_y = r->y * spread;
+    const double mirror_z = share_1 * bounce - turn;
     const double w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
-    const double side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
-    const double side_y_odd = w_z * mirror_x;   /* what x and -x share up to the sign in side_y */
-    const double side_z_odd = -(w_y * mirror_x);   /* what x and -x share up to the sign in side_z */
-    const double sin2_even = side_x * side_x;   /* what x and -x share in sin2 */
+    const double inv_d4 = inv_d2 * inv_d2;
+    const double inv_d6 = inv_d2 * inv_d4;   /* 1 / |mirror|^2 */
 
     b->n_x[i] = n_x;
+    b->w_y[i] = w_y;
+    b->w_z[i] = w_z;
     b->w2_even[i] = w2_even;
     b->n_dot_l_even[i] = n_dot_l_even;
     b->mirror_x[i] = mirror_x;
     b->mirror_y[i] = mirror_y;
     b->mirror_z[i] = mirror_z;
     b->w_dot_mirror_even[i] = w_dot_mirror_even;
-    b->side_y_odd[i] = side_y_odd;
-    b->side_z_odd[i] = side_z_odd;
-    b->sin2_even[i] = sin2_even;
+    b->inv_d6[i] = inv_d6;
 }
 
-/* Stage 3: light, diffuse, specular, intensity [14 mul 11 add 1 div 1 sqrt 1 max 3 select 4 call]. Leaves value. */
+/* Stage 3: light, diffuse [4 mul 3 add 1 div 1 sqrt 1 max]. Leaves w_x, w2, inv_w2, diffuse. */
 SYMRENDER_INLINE void stage_3(double side, block *b, int i)
 {
     const double n_x = side * b->n_x[i];
-    const double mirror_x = side * b->mirror_x[i];
-    const double side_y_odd = side * b->side_y_odd[i];
-    const double side_z_odd = side * b->side_z_odd[i];
 
     /* light [3 mul 3 add 1 div 1 sqrt] */
     const double w_x = lamp_x - n_x;   /* w = (L - P) / R */
@@ -202,14 +208,30 @@ SYMRENDER_INLINE void stage_3(double side, block *b, int i)
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
     const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [10 mul 6 add 2 select 4 call]. Phong 1975, Illumination for computer generated pictures */
-    const double w_dot_mirror = w_x * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|) */
-    const double inv_w2_d2 = b->inv_d2[i] * inv_w2;
-    const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const double side_y = side_y_odd - w_x * b->mirror_z[i];
-    const double side_z = w_x * b->mirror_y[i] + side_z_odd;
-    /* 1 - (r.v)^2, accurate where r.v is near 1 */
-    const double sin2 = inv_w2_d2 * (side_y * side_y + side_z * side_z + b->sin2_even[i]);
+    b->w_x[i] = w_x;
+    b->w2[i] = w2;
+    b->inv_w2[i] = inv_w2;
+    b->diffuse[i] = diffuse;
+}
+
+/* Stage 4: specular, intensity [14 mul 11 add 3 select 4 call]. Leaves value. */
+SYMRENDER_INLINE void stage_4(double side, block *b, int i)
+{
+    const double mirror_x = side * b->mirror_x[i];
+
+    /* specular [14 mul 9 add 2 select 4 call]. Phong 1975, Illumination for computer generated pictures */
+    const double w_dot_mirror = b->w_x[i] * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|^3) */
+    const double along_w = b->inv_w2[i] * w_dot_mirror;   /* mirror = along_w w + across */
+    const double near_cos2 = w_dot_mirror * along_w * b->inv_d6[i];   /* (r.v)^2, but for its scale */
+    /* what of mirror is at right angles to w, short where the highlight is */
+    const double across_x = mirror_x - b->w_x[i] * along_w;
+    const double across_y = b->mirror_y[i] - b->w_y[i] * along_w;
+    const double across_z = b->mirror_z[i] - b->w_z[i] * along_w;
+    const double near_sin2 = b->inv_d6[i] * (across_x * across_x + across_y * across_y + across_z * across_z);
+    /* 1 / (cos^2 + sin^2): 2 - a is 1 / a where a is within rounding of 1 */
+    const double rescale = 2.0 - near_cos2 - near_sin2;
+    const double cos2 = near_cos2 * rescale;   /* (r.v)^2 */
+    const double sin2 = near_sin2 * rescale;   /* 1 - (r.v)^2, accurate where r.v is near 1 */
     const double lobe = 0.5 > sin2 ? 1.0 - sin2 : cos2;   /* (r.v)^2, accurate where r.v is near 1 */
     const double lobe_2 = square(lobe);   /* lobe^2 */
     const double lobe_4 = square(lobe_2);   /* lobe^4 */
@@ -219,8 +241,8 @@ SYMRENDER_INLINE void stage_3(double side, block *b, int i)
     const double specular = (w_dot_mirror > 0.0 ? highlight : 0.0) * specular_gain;   /* k_s max(0, r.v)^n */
 
     /* intensity [2 add 1 select]. Phong 1975, Illumination for computer generated pictures */
-    const double lit = diffuse + specular;   /* what the light adds; the gains hold its intensity */
-    const double value = 0.1 + (w2 > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
+    const double lit = b->diffuse[i] + specular;   /* what the light adds; the gains hold its intensity */
+    const double value = 0.1 + (b->w2[i] > 0.0 ? lit : 0.0);   /* I = k_a + what the light adds */
 
     b->value[i] = value;
 }
@@ -230,6 +252,8 @@ SYMRENDER_INLINE void finish(double side, int count, const row *r, block *b)
 {
     for (int i = 0; i < count; ++i)
         stage_3(side, b, i);
+    for (int i = 0; i < count; ++i)
+        stage_4(side, b, i);
     (void)r;
 }
 
@@ -268,7 +292,11 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
         const int begin = last >= width / 2 ? width - end : width;
         if (j + 1 < row_end)
             fetch_ahead(out + stride, (size_t)width * sizeof *out);
-        for (int i = 0; i < begin; ++i)
+        /* the background, in whole vectors: it may run into the hits, which are written over it */
+        const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
+        for (int i = 0; i < before; ++i)
+            out[i] = background_here;
+        for (int i = vectors_begin(end); i < width; ++i)
             out[i] = background_here;
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
@@ -285,8 +313,6 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
             for (int i = 0; i < count; ++i)
                 out[width - 1 - at - i] = at_most(b.value[i], white);
         }
-        for (int i = end; i < width; ++i)
-            out[i] = background_here;
     }
 }
 
@@ -313,6 +339,8 @@ void centred_sphere_double_baked_points(double *values, const double *x, const d
         }
         for (int i = 0; i < length; ++i)
             stage_3(1.0, &b, i);
+        for (int i = 0; i < length; ++i)
+            stage_4(1.0, &b, i);
         for (int i = 0; i < length; ++i)
             out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background_here, white);
         for (int i = 0; i < length; ++i)

@@ -12,10 +12,10 @@
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      once: frame 4 mul 3 div 1 select 20 call
+ * ops      once: frame 4 mul 3 div 1 select 21 call
  *          a row: 1 mul 5 call
  *          a pixel: 28 mul 22 add 2 div 2 sqrt 2 max 2 select 2 call
- *          of these, once for two of them, at x and -x: 19 mul 16 add 1 div 1 sqrt 1 max
+ *          of these, once for two of them, at x and -x: 19 mul 12 add 1 div 1 sqrt 1 max
  */
 #include "centred_sphere_fast.h"
 
@@ -32,14 +32,21 @@ enum { POINTS = 256 };   /* pixels of a block: its arrays fit into the first lev
 
 /* What does not change within a frame. */
 typedef struct {
+    float shininess_single, half_exponent, zero_power_single, lamp_x_single, lamp_y_single, lamp_z_single, alpha_single,
+        focal_single, d_dot_d_frame, depth_single, along_frame, diffuse_gain, specular_gain, k_ambient_single;
     double plane_unit;
-    float lamp_x_single, lamp_y_single, lamp_z_single, focal_single, d_dot_d_frame, depth_single, along_frame,
-        diffuse_gain, shininess_single, specular_gain, zero_power_single, k_ambient_single;
-    double_double alpha, rho2;
+    double_double rho2;
 } frame;
 
 static frame frame_of(const centred_sphere_fast_scene *scene)
 {
+    /* specular [1 select 1 call] */
+    const float shininess_single = (float)scene->shininess;
+    const float half_exponent = half_of_large(shininess_single);   /* n / 2 where n is large, else 0 */
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+    const float k_specular_single = (float)scene->k_specular;
+    const float zero_power_single = (float)zero_power;
+
     /* units of length, powers of two [5 call] */
     const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
     const double plane_unit = ldexp(1, plane_exponent);
@@ -73,6 +80,7 @@ static frame frame_of(const centred_sphere_fast_scene *scene)
     const double_double depth = dd_div(dd_from(eye), dd_from(radius));
 
     /* ray and sphere [1 mul] */
+    const float alpha_single = (float)alpha.hi;
     const float focal_single = (float)focal;
     const float d_dot_d_frame = focal_single * focal_single;   /* what is the same for a frame in d_dot_d */
 
@@ -85,31 +93,28 @@ static frame frame_of(const centred_sphere_fast_scene *scene)
     const float light_intensity_single = (float)scene->light_intensity;
     const float diffuse_gain = k_diffuse_single * light_intensity_single;   /* I_L k_d */
 
-    /* specular [1 mul 1 select] */
-    const float shininess_single = (float)scene->shininess;
-    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
-    const float k_specular_single = (float)scene->k_specular;
+    /* specular [1 mul] */
     const float specular_gain = k_specular_single * light_intensity_single;   /* I_L k_s */
-    const float zero_power_single = (float)zero_power;
 
     /* intensity */
     const float k_ambient_single = (float)scene->k_ambient;
 
     const frame f = {
+        .shininess_single = shininess_single,
+        .half_exponent = half_exponent,
+        .zero_power_single = zero_power_single,
         .plane_unit = plane_unit,
         .lamp_x_single = lamp_x_single,
         .lamp_y_single = lamp_y_single,
         .lamp_z_single = lamp_z_single,
-        .alpha = alpha,
         .rho2 = rho2,
+        .alpha_single = alpha_single,
         .focal_single = focal_single,
         .d_dot_d_frame = d_dot_d_frame,
         .depth_single = depth_single,
         .along_frame = along_frame,
         .diffuse_gain = diffuse_gain,
-        .shininess_single = shininess_single,
         .specular_gain = specular_gain,
-        .zero_power_single = zero_power_single,
         .k_ambient_single = k_ambient_single,
     };
     return f;
@@ -166,9 +171,11 @@ SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *su
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
-    const double chord = from_left * to_right;
+    const float from_left_single = (float)from_left;
+    const float to_right_single = (float)to_right;
+    const float chord = from_left_single * to_right_single;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * chord;
+    const float facing2 = f->alpha_single * chord;
     const float x_single = (float)x;
     const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const float d_dot_d = s + f->d_dot_d_frame;
@@ -187,50 +194,99 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
 }
 
-/* Values of a block of pixels, from the stages that compute them to those that use them. */
+/* Where a pixel lies in its row: numbers of float64, rounded. */
 typedef struct {
-    float x_single[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS],
-        n_dot_l_even[POINTS], mirror_x[POINTS], w_dot_mirror_even[POINTS], w2[POINTS], diffuse[POINTS],
-        w_dot_mirror[POINTS], highlight_log2[POINTS], value[POINTS];
-} block;
+    float from_left_single, to_right_single, x_single;
+} place;
 
-/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 6 add 1 div 1 sqrt 1 max]. Leaves x_single, s,
- * facing, inv_d2. */
-SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
+SYMRENDER_INLINE place place_of(double x, const row *r, const frame *f)
 {
-    /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
+    /* ray and sphere [4 add] */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
-    const double chord = from_left * to_right;
-    /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * chord;
+    const float from_left_single = (float)from_left;
+    const float to_right_single = (float)to_right;
     const float x_single = (float)x;
-    const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    const float d_dot_d = s + f->d_dot_d_frame;
-    const float facing2_single = (float)facing2;
-    /* -n.D, how far the surface faces the ray: root / R */
-    const float facing = sqrtf(facing2_single > 0.0f ? facing2_single : 0.0f);
 
-    /* normal [1 div] */
-    const float inv_d2 = 1.0f / d_dot_d;
-
-    b->x_single[i] = x_single;
-    b->s[i] = s;
-    b->facing[i] = facing;
-    b->inv_d2[i] = inv_d2;
+    const place p = {
+        .from_left_single = from_left_single,
+        .to_right_single = to_right_single,
+        .x_single = x_single,
+    };
+    (void)f;
+    return p;
 }
 
-/* Stage 2, the same for x and -x: normal, light, specular [16 mul 10 add]. Leaves n_x, w2_even, n_dot_l_even,
- * mirror_x, w_dot_mirror_even. */
+/* The hits of a row, the pixels [begin, end): where the first one lies, the last one, and the middle between them. */
+typedef struct {
+    place first, middle, last;
+    float begin, end, pitch;
+} row_hits;
+
+SYMRENDER_INLINE row_hits hits_between(int begin, int end, double left, double step, const row *r, const frame *f)
+{
+    const row_hits h = {
+        .first = place_of((begin + left) * step, r, f),
+        .middle = place_of((0.5 * (begin + end - 1) + left) * step, r, f),
+        .last = place_of((end - 1 + left) * step, r, f),
+        .begin = (float)begin,
+        .end = (float)end,
+        .pitch = (float)step,
+    };
+    return h;
+}
+
+/* The place of pixel i, counted from them: what vanishes at an end is a sum of numbers that are not negative. */
+SYMRENDER_INLINE place place_in(const row_hits *h, int i)
+{
+    const float column = (float)i, after_first = column - h->begin, before_last = h->end - 1.0f - column;
+    const float from_first = after_first * h->pitch, to_last = before_last * h->pitch;
+    const float aside = (after_first - before_last) * (0.5f * h->pitch);   /* from the middle, to the right */
+    const place p = {
+        .from_left_single = h->first.from_left_single + from_first,
+        .to_right_single = h->last.to_right_single + to_last,
+        .x_single = h->middle.x_single + aside,
+    };
+    return p;
+}
+
+/* Values of a block of pixels, from the stages that compute them to those that use them. */
+typedef struct {
+    float x_single[POINTS], s[POINTS], d_dot_d[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS],
+        n_dot_l_even[POINTS], mirror_x[POINTS], w_dot_mirror_even[POINTS], w2[POINTS], diffuse[POINTS],
+        w_dot_mirror[POINTS], cos2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
+} block;
+
+/* Stage 1, the same for x and -x: ray and sphere [3 mul 2 add 1 sqrt 1 max]. Leaves x_single, s, d_dot_d, facing. */
+SYMRENDER_INLINE void stage_1(place p, const row *r, const frame *f, block *b, int i)
+{
+    /* ray and sphere [3 mul 2 add 1 sqrt 1 max] */
+    const float chord = p.from_left_single * p.to_right_single;
+    /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
+    const float facing2 = f->alpha_single * chord;
+    const float s = p.x_single * p.x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const float d_dot_d = s + f->d_dot_d_frame;
+    /* -n.D, how far the surface faces the ray: root / R */
+    const float facing = sqrtf(facing2 > 0.0f ? facing2 : 0.0f);
+
+    b->x_single[i] = p.x_single;
+    b->s[i] = s;
+    b->d_dot_d[i] = d_dot_d;
+    b->facing[i] = facing;
+}
+
+/* Stage 2, the same for x and -x: normal, light, specular [16 mul 10 add 1 div]. Leaves inv_d2, n_x, w2_even,
+ * n_dot_l_even, mirror_x, w_dot_mirror_even. */
 SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
 {
-    /* normal [6 mul 2 add] */
-    const float along = b->inv_d2[i] * (f->along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    /* normal [6 mul 2 add 1 div] */
+    const float inv_d2 = 1.0f / b->d_dot_d[i];
+    const float along = inv_d2 * (f->along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
     const float n_x = b->x_single[i] * along;
     const float n_y = r->y_single * along;
     /* a sum, where e (1 - t) would cancel */
-    const float n_z = (b->s[i] * f->depth_single + f->focal_single * b->facing[i]) * b->inv_d2[i];
+    const float n_z = (b->s[i] * f->depth_single + f->focal_single * b->facing[i]) * inv_d2;
 
     /* light [4 mul 4 add] */
     const float w_y = f->lamp_y_single - n_y;
@@ -246,6 +302,7 @@ SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
     const float mirror_z = n_z * bounce - f->focal_single;
     const float w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
 
+    b->inv_d2[i] = inv_d2;
     b->n_x[i] = n_x;
     b->w2_even[i] = w2_even;
     b->n_dot_l_even[i] = n_dot_l_even;
@@ -253,8 +310,7 @@ SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
     b->w_dot_mirror_even[i] = w_dot_mirror_even;
 }
 
-/* Stage 3: light, diffuse, specular [8 mul 4 add 1 div 1 sqrt 1 max 1 call]. Leaves w2, diffuse, w_dot_mirror,
- * highlight_log2. */
+/* Stage 3: light, diffuse, specular [8 mul 4 add 1 div 1 sqrt 1 max]. Leaves w2, diffuse, w_dot_mirror, cos2. */
 SYMRENDER_INLINE void stage_3(float side, const frame *f, block *b, int i)
 {
     const float n_x = side * b->n_x[i];
@@ -269,26 +325,43 @@ SYMRENDER_INLINE void stage_3(float side, const frame *f, block *b, int i)
     /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
     const float diffuse = (n_dot_l > 0.0f ? n_dot_l : 0.0f) * f->diffuse_gain;   /* k_d max(0, n.l) */
 
-    /* specular [4 mul 1 add 1 call] */
+    /* specular [4 mul 1 add] */
     const float w_dot_mirror = w_x * mirror_x + b->w_dot_mirror_even[i];   /* r.v = w . mirror / (|w| |D|) */
     const float inv_w2_d2 = b->inv_d2[i] * inv_w2;
     const float cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const float highlight_log2 = fast_log2_of_squaref(cos2);   /* log2 (r.v)^2 */
 
     b->w2[i] = w2;
     b->diffuse[i] = diffuse;
     b->w_dot_mirror[i] = w_dot_mirror;
+    b->cos2[i] = cos2;
+}
+
+/* Stage 4: specular [1 call]. Leaves highlight_log2. */
+SYMRENDER_INLINE void stage_4(block *b, int i)
+{
+    /* specular [1 call] */
+    const float highlight_log2 = fast_log2_of_squaref(b->cos2[i]);   /* log2 (r.v)^2 */
+
     b->highlight_log2[i] = highlight_log2;
 }
 
-/* Stage 4: specular, intensity [1 mul 2 add 2 select 1 call]. Leaves value. */
-SYMRENDER_INLINE void stage_4(const frame *f, block *b, int i)
+/* Stage 5: specular [1 call]. Leaves highlight. */
+SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
 {
-    const float zero_power_single = f->zero_power_single;
-
-    /* specular [1 mul 1 select 1 call]. Phong 1975, Illumination for computer generated pictures */
+    /* specular [1 call]. Phong 1975, Illumination for computer generated pictures */
     /* max(0, r.v)^n where r.v > 0 */
     const float highlight = fast_power_of_lobef(b->highlight_log2[i], f->shininess_single);
+
+    b->highlight[i] = highlight;
+}
+
+/* Stage 6: specular, intensity [1 mul 2 add 2 select]. Leaves value. */
+SYMRENDER_INLINE void stage_6(const frame *f, block *b, int i)
+{
+    const float highlight = b->highlight[i];
+    const float zero_power_single = f->zero_power_single;
+
+    /* specular [1 mul 1 select]. Phong 1975, Illumination for computer generated pictures */
     /* k_s max(0, r.v)^n */
     const float specular = (b->w_dot_mirror[i] > 0.0f ? highlight : zero_power_single) * f->specular_gain;
 
@@ -304,8 +377,16 @@ SYMRENDER_INLINE void finish(float side, int count, const row *r, const frame *f
 {
     for (int i = 0; i < count; ++i)
         stage_3(side, f, b, i);
+    if (f->half_exponent > 0) {
+        fast_powers_of_lobef(b->cos2, b->highlight_log2, b->highlight, f->half_exponent, count);
+    } else {
+        for (int i = 0; i < count; ++i)
+            stage_4(b, i);
+        for (int i = 0; i < count; ++i)
+            stage_5(f, b, i);
+    }
     for (int i = 0; i < count; ++i)
-        stage_4(f, b, i);
+        stage_6(f, b, i);
     (void)r;
 }
 
@@ -345,14 +426,19 @@ void centred_sphere_fast_rows(float *image, ptrdiff_t stride, const symrender_gr
         const int begin = last >= width / 2 ? width - end : width;
         if (j + 1 < row_end)
             fetch_ahead(out + stride, (size_t)width * sizeof *out);
-        for (int i = 0; i < begin; ++i)
+        /* the background, in whole vectors: it may run into the hits, which are written over it */
+        const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
+        for (int i = 0; i < before; ++i)
             out[i] = background;
+        for (int i = vectors_begin(end); i < width; ++i)
+            out[i] = background;
+        const row_hits h = hits_between(begin, end, left, step, &r, &f);
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
             const int vectors = whole_vectors(count);
             for (int i = 0; i < vectors; ++i)
-                stage_1((at + i + left) * step, &r, &f, &b, i);
+                stage_1(place_in(&h, at + i), &r, &f, &b, i);
             for (int i = 0; i < vectors; ++i)
                 stage_2(&r, &f, &b, i);
             finish(1.0f, vectors, &r, &f, &b);
@@ -362,8 +448,6 @@ void centred_sphere_fast_rows(float *image, ptrdiff_t stride, const symrender_gr
             for (int i = 0; i < count; ++i)
                 out[width - 1 - at - i] = at_most(b.value[i], white);
         }
-        for (int i = end; i < width; ++i)
-            out[i] = background;
     }
 }
 
@@ -384,7 +468,7 @@ void centred_sphere_fast_points(float *values, const double *x, const double *y,
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);
             facing[i] = sight(block_x[i] * unit, &r, &f, &doubt[i]);
-            stage_1(block_x[i] * unit, &r, &f, &b, i);
+            stage_1(place_of(block_x[i] * unit, &r, &f), &r, &f, &b, i);
         }
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);
@@ -392,8 +476,16 @@ void centred_sphere_fast_points(float *values, const double *x, const double *y,
         }
         for (int i = 0; i < length; ++i)
             stage_3(1.0f, &f, &b, i);
+        if (f.half_exponent > 0) {
+            fast_powers_of_lobef(b.cos2, b.highlight_log2, b.highlight, f.half_exponent, length);
+        } else {
+            for (int i = 0; i < length; ++i)
+                stage_4(&b, i);
+            for (int i = 0; i < length; ++i)
+                stage_5(&f, &b, i);
+        }
         for (int i = 0; i < length; ++i)
-            stage_4(&f, &b, i);
+            stage_6(&f, &b, i);
         for (int i = 0; i < length; ++i)
             out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background, white);
         for (int i = 0; i < length; ++i)

@@ -15,7 +15,7 @@
  * ops      once: frame 4 mul 3 div 1 select 21 call
  *          a row: 1 mul 5 call
  *          a pixel: 38 mul 27 add 2 div 2 sqrt 2 max 2 select 2 call
- *          of these, once for two of them, at x and -x: 24 mul 17 add 1 div 1 sqrt 1 max
+ *          of these, once for two of them, at x and -x: 24 mul 13 add 1 div 1 sqrt 1 max
  */
 #include "centred_sphere_single.h"
 
@@ -33,10 +33,10 @@ enum { POINTS = 256 };   /* pixels of a block: its arrays fit into the first lev
 /* What does not change within a frame. */
 typedef struct {
     int half_exponent;
-    float shininess_single, zero_power_single, lamp_x_single, lamp_y_single, lamp_z_single, focal_single, d_dot_d_frame,
-        depth_single, along_frame, diffuse_gain, specular_gain, k_ambient_single;
+    float shininess_single, zero_power_single, lamp_x_single, lamp_y_single, lamp_z_single, alpha_single, focal_single,
+        d_dot_d_frame, depth_single, along_frame, diffuse_gain, specular_gain, k_ambient_single;
     double plane_unit;
-    double_double alpha, rho2;
+    double_double rho2;
 } frame;
 
 static frame frame_of(const centred_sphere_single_scene *scene)
@@ -81,6 +81,7 @@ static frame frame_of(const centred_sphere_single_scene *scene)
     const double_double depth = dd_div(dd_from(eye), dd_from(radius));
 
     /* ray and sphere [1 mul] */
+    const float alpha_single = (float)alpha.hi;
     const float focal_single = (float)focal;
     const float d_dot_d_frame = focal_single * focal_single;   /* what is the same for a frame in d_dot_d */
 
@@ -107,8 +108,8 @@ static frame frame_of(const centred_sphere_single_scene *scene)
         .lamp_x_single = lamp_x_single,
         .lamp_y_single = lamp_y_single,
         .lamp_z_single = lamp_z_single,
-        .alpha = alpha,
         .rho2 = rho2,
+        .alpha_single = alpha_single,
         .focal_single = focal_single,
         .d_dot_d_frame = d_dot_d_frame,
         .depth_single = depth_single,
@@ -171,9 +172,11 @@ SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *su
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
-    const double chord = from_left * to_right;
+    const float from_left_single = (float)from_left;
+    const float to_right_single = (float)to_right;
+    const float chord = from_left_single * to_right_single;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * chord;
+    const float facing2 = f->alpha_single * chord;
     const float x_single = (float)x;
     const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const float d_dot_d = s + f->d_dot_d_frame;
@@ -192,6 +195,63 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
 }
 
+/* Where a pixel lies in its row: numbers of float64, rounded. */
+typedef struct {
+    float from_left_single, to_right_single, x_single;
+} place;
+
+SYMRENDER_INLINE place place_of(double x, const row *r, const frame *f)
+{
+    /* ray and sphere [4 add] */
+    /* distance to the two ends of the span, not negative inside it */
+    const double from_left = x - r->x_left.hi - r->x_left.lo;
+    const double to_right = r->x_right.hi - x + r->x_right.lo;
+    const float from_left_single = (float)from_left;
+    const float to_right_single = (float)to_right;
+    const float x_single = (float)x;
+
+    const place p = {
+        .from_left_single = from_left_single,
+        .to_right_single = to_right_single,
+        .x_single = x_single,
+    };
+    (void)f;
+    return p;
+}
+
+/* The hits of a row, the pixels [begin, end): where the first one lies, the last one, and the middle between them. */
+typedef struct {
+    place first, middle, last;
+    float begin, end, pitch;
+} row_hits;
+
+SYMRENDER_INLINE row_hits hits_between(int begin, int end, double left, double step, const row *r, const frame *f)
+{
+    const row_hits h = {
+        .first = place_of((begin + left) * step, r, f),
+        .middle = place_of((0.5 * (begin + end - 1) + left) * step, r, f),
+        .last = place_of((end - 1 + left) * step, r, f),
+        .begin = (float)begin,
+        .end = (float)end,
+        .pitch = (float)step,
+    };
+    return h;
+}
+
+/* The place of pixel i, counted from them: what vanishes at an end is a sum of numbers that are not negative. */
+SYMRENDER_INLINE place place_in(const row_hits *h, int i)
+{
+    const float column = (float)i, after_first = column - h->begin, before_last = h->end - 1.0f - column;
+    const float from_first = after_first * h->pitch, to_last = before_last * h->pitch;
+    const float aside = (after_first - before_last) * (0.5f * h->pitch);   /* from the middle, to the right */
+    const place p = {
+        .from_left_single = h->first.from_left_single + from_first,
+        .to_right_single = h->last.to_right_single + to_last,
+        .x_single = h->middle.x_single + aside,
+    };
+    return p;
+}
+
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
     float x_single[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS],
@@ -200,28 +260,23 @@ typedef struct {
         cos2[POINTS], sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
 } block;
 
-/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 6 add 1 div 1 sqrt 1 max]. Leaves x_single, s,
+/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 2 add 1 div 1 sqrt 1 max]. Leaves x_single, s,
  * facing, inv_d2. */
-SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
+SYMRENDER_INLINE void stage_1(place p, const row *r, const frame *f, block *b, int i)
 {
-    /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
-    /* distance to the two ends of the span, not negative inside it */
-    const double from_left = x - r->x_left.hi - r->x_left.lo;
-    const double to_right = r->x_right.hi - x + r->x_right.lo;
-    const double chord = from_left * to_right;
+    /* ray and sphere [3 mul 2 add 1 sqrt 1 max] */
+    const float chord = p.from_left_single * p.to_right_single;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
-    const double facing2 = f->alpha.hi * chord;
-    const float x_single = (float)x;
-    const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const float facing2 = f->alpha_single * chord;
+    const float s = p.x_single * p.x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const float d_dot_d = s + f->d_dot_d_frame;
-    const float facing2_single = (float)facing2;
     /* -n.D, how far the surface faces the ray: root / R */
-    const float facing = sqrtf(facing2_single > 0.0f ? facing2_single : 0.0f);
+    const float facing = sqrtf(facing2 > 0.0f ? facing2 : 0.0f);
 
     /* normal [1 div] */
     const float inv_d2 = 1.0f / d_dot_d;
 
-    b->x_single[i] = x_single;
+    b->x_single[i] = p.x_single;
     b->s[i] = s;
     b->facing[i] = facing;
     b->inv_d2[i] = inv_d2;
@@ -391,14 +446,19 @@ void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_
         const int begin = last >= width / 2 ? width - end : width;
         if (j + 1 < row_end)
             fetch_ahead(out + stride, (size_t)width * sizeof *out);
-        for (int i = 0; i < begin; ++i)
+        /* the background, in whole vectors: it may run into the hits, which are written over it */
+        const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
+        for (int i = 0; i < before; ++i)
             out[i] = background;
+        for (int i = vectors_begin(end); i < width; ++i)
+            out[i] = background;
+        const row_hits h = hits_between(begin, end, left, step, &r, &f);
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
             const int vectors = whole_vectors(count);
             for (int i = 0; i < vectors; ++i)
-                stage_1((at + i + left) * step, &r, &f, &b, i);
+                stage_1(place_in(&h, at + i), &r, &f, &b, i);
             for (int i = 0; i < vectors; ++i)
                 stage_2(&r, &f, &b, i);
             finish(1.0f, vectors, &r, &f, &b);
@@ -408,8 +468,6 @@ void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_
             for (int i = 0; i < count; ++i)
                 out[width - 1 - at - i] = at_most(b.value[i], white);
         }
-        for (int i = end; i < width; ++i)
-            out[i] = background;
     }
 }
 
@@ -430,7 +488,7 @@ void centred_sphere_single_points(float *values, const double *x, const double *
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);
             facing[i] = sight(block_x[i] * unit, &r, &f, &doubt[i]);
-            stage_1(block_x[i] * unit, &r, &f, &b, i);
+            stage_1(place_of(block_x[i] * unit, &r, &f), &r, &f, &b, i);
         }
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);

@@ -12,33 +12,42 @@
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      once: frame 1 sqrt 1 max 1 select 33 call
- *          a row: 6 call
- *          a pixel: 2 add 64 call
+ * ops      once: frame 1 sqrt 1 max 1 select 46 call
+ *          a row: 9 call
+ *          a pixel: 2 add 47 call
  */
 #include "centred_sphere_stable.h"
 
 #include "inline.h"
 #include "span.h"
 #include "units.h"
+#include "block.h"
 #include "double_double.h"
 #include "pair.h"
 #include "precise_power.h"
+#include "whole_power.h"
 #include "exact_sign.h"
 #include "range.h"
 #include "settle.h"
 #include <math.h>
 
-enum { POINTS = 128 };   /* points shaded in one go, before the few doubtful ones among them are settled */
+enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first level cache */
 
 /* What does not change within a frame. */
 typedef struct {
-    double plane_unit, focal, extent_x, extent_y, zero_power, k_ambient, shininess;
-    double_double lamp_x, lamp_y, lamp_z, alpha, rho2, depth, d_dot_d_frame, along_frame, diffuse_gain, specular_gain;
+    int half_exponent;
+    double zero_power, plane_unit, extent_x, extent_y, k_ambient, shininess;
+    double_double specular_gain, lamp_x, lamp_y, lamp2, alpha, rho2, d_dot_d_frame, slope, bend, base_frame,
+        row_dot_lamp_frame, diffuse_gain;
 } frame;
 
 static frame frame_of(const centred_sphere_stable_scene *scene)
 {
+    /* specular [1 select 2 call] */
+    const int half_exponent = half_of_whole(scene->shininess);   /* n / 2 where n is an even whole number, else 0 */
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+    const double_double specular_gain = dd_product(scene->k_specular, scene->light_intensity);   /* I_L k_s */
+
     /* units of length, powers of two [5 call] */
     const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
     const double plane_unit = ldexp(1, plane_exponent);
@@ -46,7 +55,7 @@ static frame frame_of(const centred_sphere_stable_scene *scene)
     const double eye = ldexp(scene->eye, world_exponent);
     const double radius = ldexp(scene->radius, world_exponent);
 
-    /* light [13 call] */
+    /* light [19 call] */
     const double_double from_center_x = dd_from(scene->light_x);   /* L - C */
     const double_double from_center_y = dd_from(scene->light_y);
     const double_double from_center_z = dd_from(scene->light_z);
@@ -56,6 +65,9 @@ static frame frame_of(const centred_sphere_stable_scene *scene)
     const double_double lamp_x = dd_div(dd_ldexp(from_center_x, lamp_exponent), dd_from(radius));   /* (L - C) / R */
     const double_double lamp_y = dd_div(dd_ldexp(from_center_y, lamp_exponent), dd_from(radius));
     const double_double lamp_z = dd_div(dd_ldexp(from_center_z, lamp_exponent), dd_from(radius));
+    /* |lamp|^2 + |n|^2 */
+    const double_double lamp2 = dd_add(dd_add(dd_add_double(dd_mul(lamp_x, lamp_x), 1.0), dd_mul(lamp_y, lamp_y)),
+        dd_mul(lamp_z, lamp_z));
 
     /* silhouette [1 sqrt 1 max 11 call] */
     /* alpha = kappa^2 - 1, free of cancellation */
@@ -74,32 +86,38 @@ static frame frame_of(const centred_sphere_stable_scene *scene)
     /* ray and sphere [1 call] */
     const double_double d_dot_d_frame = dd_product(focal, focal);   /* what is the same for a frame in d_dot_d */
 
-    /* normal [1 call] */
-    const double_double along_frame = dd_mul_double(depth, focal);   /* what is the same for a frame in along */
+    /* normal [5 call] */
+    /* F = kappa (f x, f y, s): F.lamp = slope x + bend s + base */
+    const double_double slope = dd_mul(dd_mul_double(depth, focal), lamp_x);
+    const double_double bend = dd_mul(depth, lamp_z);
+    /* what is the same for a frame in base */
+    const double_double base_frame = dd_mul(dd_mul_double(depth, focal), lamp_y);
+
+    /* light [2 call] */
+    /* what is the same for a frame in row_dot_lamp */
+    const double_double row_dot_lamp_frame = dd_neg(dd_mul_double(lamp_z, focal));
 
     /* diffuse [1 call] */
     const double_double diffuse_gain = dd_product(scene->k_diffuse, scene->light_intensity);   /* I_L k_d */
 
-    /* specular [1 select 1 call] */
-    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
-    const double_double specular_gain = dd_product(scene->k_specular, scene->light_intensity);   /* I_L k_s */
-
     const frame f = {
+        .half_exponent = half_exponent,
+        .zero_power = zero_power,
+        .specular_gain = specular_gain,
         .plane_unit = plane_unit,
         .lamp_x = lamp_x,
         .lamp_y = lamp_y,
-        .lamp_z = lamp_z,
+        .lamp2 = lamp2,
         .alpha = alpha,
-        .focal = focal,
         .rho2 = rho2,
-        .depth = depth,
         .extent_x = extent_x,
         .extent_y = extent_y,
         .d_dot_d_frame = d_dot_d_frame,
-        .along_frame = along_frame,
+        .slope = slope,
+        .bend = bend,
+        .base_frame = base_frame,
+        .row_dot_lamp_frame = row_dot_lamp_frame,
         .diffuse_gain = diffuse_gain,
-        .zero_power = zero_power,
-        .specular_gain = specular_gain,
         .k_ambient = scene->k_ambient,
         .shininess = scene->shininess,
     };
@@ -108,8 +126,7 @@ static frame frame_of(const centred_sphere_stable_scene *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double y;
-    double_double x_left, x_right, s_row;
+    double_double x_left, x_right, s_row, base, row_dot_lamp;
 } row;
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
@@ -123,8 +140,14 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     /* ray and sphere [1 call] */
     const double_double s_row = dd_product(y, y);   /* what is the same for a row in s */
 
+    /* normal [1 call] */
+    const double_double base = dd_mul_double(f->base_frame, y);
+
+    /* light [2 call] */
+    const double_double row_dot_lamp = dd_add(dd_mul_double(f->lamp_y, y), f->row_dot_lamp_frame);
+
     const row r = {
-        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row,
+        .x_left = x_left, .x_right = x_right, .s_row = s_row, .base = base, .row_dot_lamp = row_dot_lamp,
     };
     return r;
 }
@@ -149,15 +172,12 @@ static inline double certainty(double facing2, double d_dot_d)
     return fabs(facing2) - 0x1p-40 * d_dot_d;
 }
 
-/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
-static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
-    const centred_sphere_stable_scene *scene)
+/* facing2 of the ray through x of this row: its sign says whether the ray hits, for sure where *sure is positive. */
+SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *sure)
 {
-    const double x = column * step;
-
     /* ray and sphere [8 call] */
     /* distance to the two ends of the span, not negative inside it */
-    const double_double from_left = dd_sub(dd_from(x), r->x_left);
+    const double_double from_left = dd_add_double(dd_neg(r->x_left), x);
     const double_double to_right = dd_add_double(r->x_right, -x);
     const double_double chord = pair_mul(from_left, to_right);
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
@@ -165,7 +185,18 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
     const double_double s = pair_add(dd_product(x, x), r->s_row);   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double_double d_dot_d = pair_add(s, f->d_dot_d_frame);
 
-    return certainty(facing2.hi, d_dot_d.hi) > 0.0 ? facing2.hi > 0.0 : hits_exactly(column * pixel, plane_y, scene);
+    *sure = certainty(facing2.hi, d_dot_d.hi);
+    return facing2.hi;
+}
+
+/* Does the ray through the centre of a pixel of this row hit? The pixel is column pixels to the right of the axis. */
+static int is_hit(double column, double plane_y, const row *r, const frame *f, double pixel, double step,
+    const centred_sphere_stable_scene *scene)
+{
+    double sure;
+    const double facing2 = sight(column * step, r, f, &sure);
+
+    return sure > 0.0 ? facing2 > 0.0 : hits_exactly(column * pixel, plane_y, scene);
 }
 
 /* ---- how far a value may be off ---- */
@@ -187,13 +218,19 @@ static bounds bounds_of(
     const range x = range_between(-x_most, x_most), y = range_between(-y_most, y_most);
     const double least_cos2 = scene->shininess < 2.0 ? 0x1p-20 : 0.0;
 
+    /* specular [1 select 4 call] */
+    const int half_exponent = half_of_whole(scene->shininess);
+    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;
+    const range specular_gain = range_product(DOUBLE_DOUBLE, range_exact(scene->k_specular),
+        range_exact(scene->light_intensity));
+
     /* units of length, powers of two [4 call] */
     const int plane_exponent = unit_exponent(scene->eye);
     const int world_exponent = unit_exponent(scene->radius);
     const double eye = ldexp(scene->eye, world_exponent);
     const double radius = ldexp(scene->radius, world_exponent);
 
-    /* light [20 call] */
+    /* light [29 call] */
     const double_double from_center_x = dd_from(scene->light_x);
     const double_double from_center_y = dd_from(scene->light_y);
     const double_double from_center_z = dd_from(scene->light_z);
@@ -206,6 +243,11 @@ static bounds bounds_of(
     const range lamp_z = range_blurred(range_quotient(DOUBLE_DOUBLE,
         range_ldexp(range_known_wide(from_center_z), lamp_exponent), range_exact(radius)), 0x1p-195);
     const double light_gap2 = range_light_gap2(lamp_x, lamp_y, lamp_z);   /* the least |w|^2: (|lamp| - 1)^2 */
+    const double lamp_length = range_length(lamp_x, lamp_y, lamp_z);   /* the largest |lamp| */
+    const range lamp2 = range_sum(DOUBLE_DOUBLE,
+        range_sum(DOUBLE_DOUBLE, range_sum(DOUBLE_DOUBLE, range_square(DOUBLE_DOUBLE, lamp_x), range_exact(1.0)),
+        range_square(DOUBLE_DOUBLE, lamp_y)), range_square(DOUBLE_DOUBLE, lamp_z));
+    const range d_dot_lamp_odd = range_product(PAIR, lamp_x, x);
 
     /* silhouette [1 div 24 call] */
     const range alpha = range_quotient(DOUBLE_DOUBLE,
@@ -222,8 +264,8 @@ static bounds bounds_of(
     const range x_right = reach;
     const range depth = range_quotient(DOUBLE_DOUBLE, range_exact(eye), range_exact(radius));
 
-    /* ray and sphere [17 call] */
-    const range from_left = range_within(range_difference(DOUBLE_DOUBLE, x, x_left), 0.0, INFINITY);
+    /* ray and sphere [18 call] */
+    const range from_left = range_within(range_sum(DOUBLE_DOUBLE, range_neg(x_left), x), 0.0, INFINITY);
     const range to_right = range_within(range_sum(DOUBLE_DOUBLE, x_right, range_neg(x)), 0.0, INFINITY);
     const range chord = range_product(PAIR, from_left, to_right);
     const range s_row = range_square(DOUBLE_DOUBLE, y);
@@ -234,48 +276,41 @@ static bounds bounds_of(
     const range facing2 = range_within(range_product(PAIR, alpha, chord), SURE_HIT, farthest2);
     const range facing = range_root(PAIR, range_positive_part(facing2));
 
-    /* normal [15 call] */
+    /* normal [13 call] */
     const range inv_d2 = range_inverse(PAIR, d_dot_d);
-    const range along_frame = range_product(DOUBLE_DOUBLE, depth, range_exact(focal));
-    const range along = range_product(PAIR, inv_d2, range_difference(PAIR, along_frame, facing));
-    const range n_x = range_within(range_product(PAIR, along, x), -1.0, 1.0);
-    const range n_y = range_within(range_product(PAIR, along, y), -1.0, 1.0);
-    const range n_z = range_within(range_product(PAIR,
-        range_sum(PAIR, range_product(PAIR, s, depth), range_product(PAIR, facing, range_exact(focal))), inv_d2),
-        -1.0, 1.0);
+    const range slope = range_product(DOUBLE_DOUBLE, range_product(DOUBLE_DOUBLE, depth, range_exact(focal)), lamp_x);
+    const range bend = range_product(DOUBLE_DOUBLE, depth, lamp_z);
+    const range base_frame = range_product(DOUBLE_DOUBLE, range_product(DOUBLE_DOUBLE, depth, range_exact(focal)),
+        lamp_y);
+    const range base = range_product(DOUBLE_DOUBLE, base_frame, y);
+    const range foot_dot_lamp_even = range_sum(PAIR, range_product(PAIR, s, bend), base);
+    const range foot_dot_lamp_odd = range_product(PAIR, slope, x);
+    const range foot_dot_lamp = range_sum(PAIR, foot_dot_lamp_even, foot_dot_lamp_odd);
 
-    /* light [18 call] */
-    const range w_x = range_difference(PAIR, lamp_x, n_x);
-    const range w_y = range_difference(PAIR, lamp_y, n_y);
-    const range w_z = range_difference(PAIR, lamp_z, n_z);
-    const range w2 = range_within(range_sum(PAIR, range_sum(PAIR, range_square(PAIR, w_x), range_square(PAIR, w_y)),
-        range_square(PAIR, w_z)), light_gap2, INFINITY);
+    /* light [20 call] */
+    const range row_dot_lamp_frame = range_neg(range_product(DOUBLE_DOUBLE, lamp_z, range_exact(focal)));
+    const range row_dot_lamp = range_sum(DOUBLE_DOUBLE, range_product(DOUBLE_DOUBLE, lamp_y, y), row_dot_lamp_frame);
+    const range d_dot_lamp = range_sum(PAIR, row_dot_lamp, d_dot_lamp_odd);
+    const range n_dot_lamp = range_within(range_product(PAIR, inv_d2,
+        range_difference(PAIR, foot_dot_lamp, range_product(PAIR, facing, d_dot_lamp))), -lamp_length, lamp_length);
+    const range w2 = range_within(range_difference(PAIR, lamp2, range_scaled(n_dot_lamp, 2.0)), light_gap2, INFINITY);
     const range inv_w2 = range_inverse(PAIR, w2);
-    const range n_dot_l = range_within(range_product(PAIR,
-        range_sum(PAIR, range_sum(PAIR, range_product(PAIR, n_x, w_x), range_product(PAIR, n_y, w_y)),
-        range_product(PAIR, n_z, w_z)), range_root(PAIR, inv_w2)), -1.0, 1.0);
+    const range n_dot_l = range_within(range_product(PAIR, range_sum(PAIR, n_dot_lamp, range_neg(range_exact(1.0))),
+        range_root(PAIR, inv_w2)), -1.0, 1.0);
 
     /* diffuse [5 call] */
     const range diffuse_gain = range_product(DOUBLE_DOUBLE, range_exact(scene->k_diffuse),
         range_exact(scene->light_intensity));
     const range diffuse = range_product(PAIR, range_positive_part(n_dot_l), diffuse_gain);
 
-    /* specular [1 select 30 call] */
-    const range bounce = range_scaled(facing, 2.0);
-    const range mirror_x = range_sum(PAIR, range_product(PAIR, n_x, bounce), x);
-    const range mirror_y = range_sum(PAIR, range_product(PAIR, n_y, bounce), y);
-    const range mirror_z = range_sum(PAIR, range_product(PAIR, n_z, bounce), range_neg(range_exact(focal)));
-    const range w_dot_mirror = range_sum(PAIR,
-        range_sum(PAIR, range_product(PAIR, w_x, mirror_x), range_product(PAIR, w_y, mirror_y)),
-        range_product(PAIR, w_z, mirror_z));
+    /* specular [19 call] */
+    const range w_dot_mirror = range_sum(PAIR, d_dot_lamp,
+        range_product(PAIR, facing, range_sum(PAIR, range_scaled(n_dot_lamp, 2.0), range_neg(range_exact(1.0)))));
     const range inv_w2_d2 = range_product(PAIR, inv_d2, inv_w2);
     const range cos2 = range_within(range_product(PAIR, range_square(PAIR, w_dot_mirror), inv_w2_d2), least_cos2, 1.0);
     const range sin2 = range_within(range_sum(PAIR, range_neg(cos2), range_exact(1.0)), 0.0, 1.0);
-    const range highlight = range_power_of_cosine(PAIR, cos2, sin2, range_exact(scene->shininess),
+    const range highlight = range_lobe(PAIR, cos2, sin2, range_exact(scene->shininess), half_exponent,
         PRECISE_POWER_ERROR, PRECISE_POWER_FLOOR);
-    const double zero_power = scene->shininess == 0.0 ? 1.0 : 0.0;
-    const range specular_gain = range_product(DOUBLE_DOUBLE, range_exact(scene->k_specular),
-        range_exact(scene->light_intensity));
     const range specular = range_product(PAIR, range_either(highlight, range_exact(zero_power)), specular_gain);
 
     /* intensity [5 call] */
@@ -294,7 +329,8 @@ static bounds bounds_of(
 
 /* The bounds of a frame where no hit is farther from the axis than these, in the unit of the image plane. */
 static bounds bounds_within(
-    const centred_sphere_stable_scene *scene, const frame *f, double x_most, double y_most)
+    const centred_sphere_stable_scene *scene, const frame *f,
+    double x_most, double y_most)
 {
     const double x_extent = f->extent_x * (1.0 + 0x1p-20), y_extent = f->extent_y * (1.0 + 0x1p-20);
     return bounds_of(scene, x_most < x_extent ? x_most : x_extent, y_most < y_extent ? y_most : y_extent);
@@ -302,18 +338,42 @@ static bounds bounds_within(
 
 /* ---- shading ---- */
 
-/* The intensity along a ray that hits, and a bound of its error: 0 where it is exact, INFINITY for an unknown one. */
-typedef struct {
-    double_double value;
-    double error;
-    double miss;   /* positive where the ray surely misses */
-} sample;
+/* A bound of a value's error, by the quantities that decide its conditions; 0 where it is exact, INFINITY where nothing
+ * is known. */
+SYMRENDER_INLINE double error_of(double facing2, double d_dot_d, double n_dot_l, double w_dot_mirror, const bounds *b)
+{
+    const int is_clear = (facing2 - SURE_HIT * d_dot_d > 0.0)
+        & ((w_dot_mirror <= b->lobe_from) | (w_dot_mirror >= b->lobe_to));
+    /* where it is unlit, the value is the ambient one, exactly */
+    const int is_unlit = (n_dot_l < b->unlit) & (w_dot_mirror < b->no_lobe);
 
-SYMRENDER_INLINE sample shade(double x, const row *r, const frame *f, const bounds *b)
+    return is_clear ? (is_unlit ? 0.0 : b->value) : (double)INFINITY;
+}
+
+/* Does a ray surely miss? */
+SYMRENDER_INLINE int surely_misses(double facing2, double d_dot_d)
+{
+    return -0x1p-40 * d_dot_d - facing2 > 0.0;
+}
+
+/* Values of a block of pixels, from the stages that compute them to those that use them. */
+typedef struct {
+    double facing[POINTS], facing_lo[POINTS], inv_d2[POINTS], inv_d2_lo[POINTS], foot_dot_lamp_even[POINTS],
+        foot_dot_lamp_even_lo[POINTS], foot_dot_lamp_odd[POINTS], foot_dot_lamp_odd_lo[POINTS], d_dot_lamp_odd[POINTS],
+        d_dot_lamp_odd_lo[POINTS], facing2[POINTS], d_dot_d[POINTS], w2[POINTS], w2_lo[POINTS], diffuse[POINTS],
+        diffuse_lo[POINTS], w_dot_mirror[POINTS], w_dot_mirror_lo[POINTS], cos2[POINTS], cos2_lo[POINTS],
+        n_dot_l[POINTS], sin2[POINTS], sin2_lo[POINTS], highlight[POINTS], highlight_lo[POINTS], value[POINTS],
+        value_lo[POINTS];
+    double error[POINTS];   /* a bound of that of the value: 0 where it is exact, INFINITY for an unknown one */
+} block;
+
+/* Stage 1, the same for x and -x: ray and sphere, normal, light [15 call]. Leaves facing, inv_d2,
+ * foot_dot_lamp_even, foot_dot_lamp_odd, d_dot_lamp_odd, facing2, d_dot_d. */
+SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [10 call] */
     /* distance to the two ends of the span, not negative inside it */
-    const double_double from_left = dd_sub(dd_from(x), r->x_left);
+    const double_double from_left = dd_add_double(dd_neg(r->x_left), x);
     const double_double to_right = dd_add_double(r->x_right, -x);
     const double_double chord = pair_mul(from_left, to_right);
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
@@ -323,43 +383,109 @@ SYMRENDER_INLINE sample shade(double x, const row *r, const frame *f, const boun
     /* -n.D, how far the surface faces the ray: root / R */
     const double_double facing = pair_sqrt(pair_positive_part(facing2));
 
-    /* normal [9 call] */
+    /* normal [4 call] */
     const double_double inv_d2 = pair_inverse(d_dot_d);
-    /* t / R: n = (t x, t y, e (1 - t)) / R */
-    const double_double along = pair_mul(inv_d2, pair_sub(f->along_frame, facing));
-    const double_double n_x = pair_mul_double(along, x);
-    const double_double n_y = pair_mul_double(along, r->y);
-    /* a sum, where e (1 - t) would cancel */
-    const double_double n_z = pair_mul(pair_add(pair_mul(s, f->depth), pair_mul_double(facing, f->focal)), inv_d2);
+    /* what x and -x share in foot_dot_lamp */
+    const double_double foot_dot_lamp_even = pair_add(pair_mul(s, f->bend), r->base);
+    /* what x and -x share up to the sign in foot_dot_lamp */
+    const double_double foot_dot_lamp_odd = pair_mul_double(f->slope, x);
 
-    /* light [16 call] */
-    const double_double w_x = pair_sub(f->lamp_x, n_x);   /* w = (L - P) / R */
-    const double_double w_y = pair_sub(f->lamp_y, n_y);
-    const double_double w_z = pair_sub(f->lamp_z, n_z);
-    const double_double w2 = pair_add(pair_add(pair_square(w_x), pair_square(w_y)), pair_square(w_z));   /* |w|^2 */
+    /* light [1 call] */
+    /* what x and -x share up to the sign in d_dot_lamp */
+    const double_double d_dot_lamp_odd = pair_mul_double(f->lamp_x, x);
+
+    b->facing[i] = facing.hi;
+    b->facing_lo[i] = facing.lo;
+    b->inv_d2[i] = inv_d2.hi;
+    b->inv_d2_lo[i] = inv_d2.lo;
+    b->foot_dot_lamp_even[i] = foot_dot_lamp_even.hi;
+    b->foot_dot_lamp_even_lo[i] = foot_dot_lamp_even.lo;
+    b->foot_dot_lamp_odd[i] = foot_dot_lamp_odd.hi;
+    b->foot_dot_lamp_odd_lo[i] = foot_dot_lamp_odd.lo;
+    b->d_dot_lamp_odd[i] = d_dot_lamp_odd.hi;
+    b->d_dot_lamp_odd_lo[i] = d_dot_lamp_odd.lo;
+    b->facing2[i] = facing2.hi;
+    b->d_dot_d[i] = d_dot_d.hi;
+}
+
+/* Stage 2: normal, light, diffuse, specular [20 call]. Leaves w2, diffuse, w_dot_mirror, cos2, n_dot_l. */
+SYMRENDER_INLINE void stage_2(double side, const row *r, const frame *f, block *b, int i)
+{
+    const double_double foot_dot_lamp_odd = {side * b->foot_dot_lamp_odd[i], side * b->foot_dot_lamp_odd_lo[i]};
+    const double_double d_dot_lamp_odd = {side * b->d_dot_lamp_odd[i], side * b->d_dot_lamp_odd_lo[i]};
+    const double_double facing = {b->facing[i], b->facing_lo[i]};
+    const double_double inv_d2 = {b->inv_d2[i], b->inv_d2_lo[i]};
+    const double_double foot_dot_lamp_even = {b->foot_dot_lamp_even[i], b->foot_dot_lamp_even_lo[i]};
+
+    /* normal [1 call] */
+    const double_double foot_dot_lamp = pair_add(foot_dot_lamp_even, foot_dot_lamp_odd);
+
+    /* light [10 call] */
+    const double_double d_dot_lamp = pair_add(r->row_dot_lamp, d_dot_lamp_odd);   /* D.lamp */
+    /* n.lamp, with n = (F - facing D) / |D|^2 */
+    const double_double n_dot_lamp = pair_mul(inv_d2, pair_sub(foot_dot_lamp, pair_mul(facing, d_dot_lamp)));
+    const double_double w2 = pair_sub(f->lamp2, dd_scale(n_dot_lamp, 2.0));   /* |w|^2 for w = lamp - n */
     const double_double inv_w2 = pair_inverse(w2);
     /* n.l = n.w / |w| */
-    const double_double n_dot_l = pair_mul(pair_add(pair_add(pair_mul(n_x, w_x), pair_mul(n_y, w_y)),
-        pair_mul(n_z, w_z)), pair_sqrt(inv_w2));
+    const double_double n_dot_l = pair_mul(pair_add_double(n_dot_lamp, -1.0), pair_sqrt(inv_w2));
 
     /* diffuse [2 call]. Phong 1975, Illumination for computer generated pictures */
     const double_double diffuse = pair_mul(pair_positive_part(n_dot_l), f->diffuse_gain);   /* k_d max(0, n.l) */
 
-    /* specular [1 add 23 call]. Phong 1975, Illumination for computer generated pictures */
-    const double_double bounce = dd_scale(facing, 2.0);
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double_double mirror_x = pair_add_double(pair_mul(n_x, bounce), x);
-    const double_double mirror_y = pair_add_double(pair_mul(n_y, bounce), r->y);
-    const double_double mirror_z = pair_add_double(pair_mul(n_z, bounce), -f->focal);
-    /* r.v = w . mirror / (|w| |D|) */
-    const double_double w_dot_mirror = pair_add(pair_add(pair_mul(w_x, mirror_x), pair_mul(w_y, mirror_y)),
-        pair_mul(w_z, mirror_z));
+    /* specular [7 call] */
+    /* r.v = w . mirror / (|w| |D|), mirror = D + 2 facing n */
+    const double_double w_dot_mirror = pair_add(d_dot_lamp,
+        pair_mul(facing, pair_add_double(dd_scale(n_dot_lamp, 2.0), -1.0)));
     const double_double inv_w2_d2 = pair_mul(inv_d2, inv_w2);
     const double_double cos2 = pair_mul(pair_square(w_dot_mirror), inv_w2_d2);   /* (r.v)^2 */
+
+    b->w2[i] = w2.hi;
+    b->w2_lo[i] = w2.lo;
+    b->diffuse[i] = diffuse.hi;
+    b->diffuse_lo[i] = diffuse.lo;
+    b->w_dot_mirror[i] = w_dot_mirror.hi;
+    b->w_dot_mirror_lo[i] = w_dot_mirror.lo;
+    b->cos2[i] = cos2.hi;
+    b->cos2_lo[i] = cos2.lo;
+    b->n_dot_l[i] = n_dot_l.hi;
+}
+
+/* Stage 3: specular [2 call]. Leaves sin2. */
+SYMRENDER_INLINE void stage_3(block *b, int i)
+{
+    const double_double cos2 = {b->cos2[i], b->cos2_lo[i]};
+
+    /* specular [2 call] */
     /* 1 - (r.v)^2 as a difference: what cancels is paid for */
     const double_double sin2 = pair_add_double(dd_neg(cos2), 1.0);
+
+    b->sin2[i] = sin2.hi;
+    b->sin2_lo[i] = sin2.lo;
+}
+
+/* Stage 4: specular [3 call]. Leaves highlight. */
+SYMRENDER_INLINE void stage_4(const frame *f, block *b, int i)
+{
+    const double_double cos2 = {b->cos2[i], b->cos2_lo[i]};
+    const double_double sin2 = {b->sin2[i], b->sin2_lo[i]};
+
+    /* specular [3 call]. Phong 1975, Illumination for computer generated pictures */
     /* max(0, r.v)^n where r.v > 0 */
     const double_double highlight = precise_power_of_cosine(pair_normalised(cos2), pair_normalised(sin2), f->shininess);
+
+    b->highlight[i] = highlight.hi;
+    b->highlight_lo[i] = highlight.lo;
+}
+
+/* Stage 5: specular, intensity [2 add 7 call]. Leaves value. */
+SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
+{
+    const double_double w2 = {b->w2[i], b->w2_lo[i]};
+    const double_double diffuse = {b->diffuse[i], b->diffuse_lo[i]};
+    const double_double w_dot_mirror = {b->w_dot_mirror[i], b->w_dot_mirror_lo[i]};
+    const double_double highlight = {b->highlight[i], b->highlight_lo[i]};
+
+    /* specular [1 add 3 call]. Phong 1975, Illumination for computer generated pictures */
     /* k_s max(0, r.v)^n */
     const double_double specular = pair_mul(pair_select(w_dot_mirror.hi + w_dot_mirror.lo > 0.0, highlight,
         dd_from(f->zero_power)), f->specular_gain);
@@ -369,65 +495,55 @@ SYMRENDER_INLINE sample shade(double x, const row *r, const frame *f, const boun
     /* I = k_a + what the light adds */
     const double_double value = pair_add_double(pair_select(w2.hi + w2.lo > 0.0, lit, dd_from(0.0)), f->k_ambient);
 
-    /* conditions that are decided */
-    const double sure = facing2.hi - SURE_HIT * d_dot_d.hi;
-    const int is_clear = (sure > 0.0)
-        & ((w_dot_mirror.hi <= b->lobe_from) | (w_dot_mirror.hi >= b->lobe_to));
-    /* where it is unlit, the value is the ambient one, exactly */
-    const int is_unlit = (n_dot_l.hi < b->unlit) & (w_dot_mirror.hi < b->no_lobe);
-
-    const sample taken = {
-        .value = value,
-        .error = is_clear ? (is_unlit ? 0.0 : b->value) : (double)INFINITY,
-        .miss = -0x1p-40 * d_dot_d.hi - facing2.hi,
-    };
-    return taken;
+    b->value[i] = value.hi;
+    b->value_lo[i] = value.lo;
 }
 
-/* Values of a block of points, up to their bounds. */
-typedef struct {
-    double value[POINTS];
-    double rest[POINTS];    /* the value is value + rest */
-    double error[POINTS];
-} block;
-
-SYMRENDER_INLINE void keep(block *b, int i, const sample *s)
+/* The stages that differ between x and -x, for pixels right (side 1) or left (side -1) of the middle of the row. */
+SYMRENDER_INLINE void finish(double side, int count, const row *r, const frame *f, block *b)
 {
-    b->value[i] = s->value.hi;
-    b->rest[i] = s->value.lo;
-    b->error[i] = s->error;
+    for (int i = 0; i < count; ++i)
+        stage_2(side, r, f, b, i);
+    if (f->half_exponent > 0) {
+        whole_powers_of_pair(b->cos2, b->cos2_lo, b->highlight, b->highlight_lo, f->half_exponent, count);
+    } else {
+        for (int i = 0; i < count; ++i)
+            stage_3(b, i);
+        for (int i = 0; i < count; ++i)
+            stage_4(f, b, i);
+    }
+    for (int i = 0; i < count; ++i)
+        stage_5(f, b, i);
 }
 
-/* The same where the ray may miss: then the value is the background's, exactly. */
-SYMRENDER_INLINE void keep_or_miss(block *b, int i, const sample *s, double background)
+/* Bounds of the errors of a block of values. */
+SYMRENDER_INLINE void judge(block *b, int count, const bounds *limits)
 {
-    keep(b, i, s);
-    const int is_miss = s->miss > 0.0;
-    b->value[i] = is_miss ? background : b->value[i];
-    b->rest[i] = is_miss ? 0.0 : b->rest[i];
-    b->error[i] = is_miss ? 0.0 : b->error[i];
+    for (int i = 0; i < count; ++i)
+        b->error[i] = error_of(b->facing2[i], b->d_dot_d[i], b->n_dot_l[i], b->w_dot_mirror[i], limits);
 }
 
-/* Writes values within 4 ulp of the true ones, as far as the bounds show them to be that, and the
- * numbers, from `first` on, of the points where they do not. Returns how many those are. */
-static ptrdiff_t settle(const block *b, int count, double *restrict out, double white,
-    ptrdiff_t first, ptrdiff_t *unsettled)
+/* Writes values within 4 ulp of the true ones, as far as the bounds show them to be that, and
+ * the numbers of the points where they do not, from `first` on or back. Returns how many those are. `forth` is 1 or -1:
+ * value k goes to out[k forth]; the first `passed` values are passed over. */
+SYMRENDER_INLINE ptrdiff_t settle(const block *b, int passed, int count, double *restrict out, int forth,
+    double white, ptrdiff_t first, ptrdiff_t *unsettled)
 {
     int settled[POINTS], some = 0;
-    for (int i = 0; i < count; ++i) {
-        const double_double v = dd_sum(b->value[i], b->rest[i]);
+    for (int i = passed; i < count; ++i) {
+        const double_double v = dd_sum(b->value[i], b->value_lo[i]);
         const int is_settled = is_within_four_ulp(
             v, b->error[i]);
-        out[i] = v.hi > white ? white : v.hi;
+        out[forth * i] = v.hi > white ? white : v.hi;
         settled[i] = is_settled;
         some += !is_settled;
     }
     if (some == 0)
         return 0;
     ptrdiff_t listed = 0;
-    for (int i = 0; i < count; ++i)
+    for (int i = passed; i < count; ++i)
         if (!settled[i])
-            unsettled[listed++] = first + i;
+            unsettled[listed++] = first + forth * i;
     return listed;
 }
 
@@ -452,37 +568,42 @@ ptrdiff_t centred_sphere_stable_rows(
     const bounds b = bounds_within(scene, &f, 0.5 * width * step, 0.5 * grid->height * step);
     const double background = (double)(scene->background > grid->white ? grid->white : scene->background);
     ptrdiff_t found = 0;
+    block values SYMRENDER_ALIGNED;
+    row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
         double *restrict out = image + j * stride;
         const double plane_y = (top - j) * pixel;
-        const row r = row_of(plane_y * unit, &f);
+        const row r = next;
+        next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
 
-        /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
-        const double left_end = r.x_left.hi / step - left, right_end = r.x_right.hi / step - left;
-        pixel_span hits = span_between(left_end, right_end, width);
-        while (hits.first > 0 && is_hit(hits.first - 1 + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.first;
-        while (hits.last < width - 1 && is_hit(hits.last + 1 + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.last;
-        while (hits.first <= hits.last && !is_hit(hits.first + left, plane_y, &r, &f, pixel, step, scene))
-            ++hits.first;
-        while (hits.last >= hits.first && !is_hit(hits.last + left, plane_y, &r, &f, pixel, step, scene))
-            --hits.last;
+        /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
+         * closed form and settled by an exact test */
+        int last = span_between(0.0, r.x_right.hi / step - left, width).last;
+        while (last < width - 1 && is_hit(last + 1 + left, plane_y, &r, &f, pixel, step, scene))
+            ++last;
+        while (last >= width / 2 && !is_hit(last + left, plane_y, &r, &f, pixel, step, scene))
+            --last;
 
-        const int begin = hits.first <= hits.last ? hits.first : width;
-        const int end = hits.first <= hits.last ? hits.last + 1 : width;
+        const int end = last >= width / 2 ? last + 1 : width;
+        const int begin = last >= width / 2 ? width - end : width;
         for (int i = 0; i < begin; ++i)
             out[i] = background;
-        for (int at = begin, count; at < end; at += count) {
+        /* the right half of the span, and pixel by pixel its mirror image */
+        for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
-            block values;
-            for (int i = 0; i < count; ++i) {
-                const sample s = shade((at + i + left) * step, &r, &f, &b);
-                keep(&values, i, &s);
-            }
-            found += settle(&values, count, out + at, grid->white,
-                (ptrdiff_t)j * width + at, unsettled + found);
+            const int vectors = whole_vectors(count);
+            const int middle = 2 * at + 1 == width;   /* it is its own mirror image */
+            const int mirrored = width - 1 - at;
+            for (int i = 0; i < vectors; ++i)
+                stage_1((at + i + left) * step, &r, &f, &values, i);
+            finish(1.0, vectors, &r, &f, &values);
+            judge(&values, vectors, &b);
+            found += settle(&values, 0, count, out + at, 1, grid->white, (ptrdiff_t)j * width + at, unsettled + found);
+            finish(-1.0, vectors, &r, &f, &values);
+            judge(&values, vectors, &b);
+            found += settle(&values, middle, count, out + mirrored, -1, grid->white, (ptrdiff_t)j * width + mirrored,
+                unsettled + found);
         }
         for (int i = end; i < width; ++i)
             out[i] = background;
@@ -504,14 +625,35 @@ static bounds bounds_at(const centred_sphere_stable_scene *scene, const frame *f
 }
 
 /* A block of points, whose rays may miss. */
-SYMRENDER_INLINE void shade_block(block *found, const double *x, const double *y, int count, const frame *f,
-    const bounds *b, double background)
+SYMRENDER_INLINE void shade_block(block *found, const double *restrict block_x, const double *restrict block_y,
+    int length, const frame *f, const bounds *limits, double background)
 {
     const double unit = f->plane_unit;
-    for (int i = 0; i < count; ++i) {
-        const row r = row_of(y[i] * unit, f);
-        const sample s = shade(x[i] * unit, &r, f, b);
-        keep_or_miss(found, i, &s, background);
+    for (int i = 0; i < length; ++i) {
+        const row r = row_of(block_y[i] * unit, f);
+        stage_1(block_x[i] * unit, &r, f, found, i);
+    }
+    for (int i = 0; i < length; ++i) {
+        const row r = row_of(block_y[i] * unit, f);
+        stage_2(1.0, &r, f, found, i);
+    }
+    if (f->half_exponent > 0) {
+        whole_powers_of_pair(found->cos2, found->cos2_lo, found->highlight, found->highlight_lo, f->half_exponent,
+            length);
+    } else {
+        for (int i = 0; i < length; ++i)
+            stage_3(found, i);
+        for (int i = 0; i < length; ++i)
+            stage_4(f, found, i);
+    }
+    for (int i = 0; i < length; ++i)
+        stage_5(f, found, i);
+    judge(found, length, limits);
+    for (int i = 0; i < length; ++i) {
+        const int is_miss = surely_misses(found->facing2[i], found->d_dot_d[i]);
+        found->value[i] = is_miss ? background : found->value[i];
+        found->value_lo[i] = is_miss ? 0.0 : found->value_lo[i];
+        found->error[i] = is_miss ? 0.0 : found->error[i];
     }
 }
 
@@ -524,10 +666,9 @@ ptrdiff_t centred_sphere_stable_points(
     ptrdiff_t found = 0;
     for (ptrdiff_t at = 0; at < count; at += POINTS) {
         const int length = count - at < POINTS ? (int)(count - at) : POINTS;
-        block values_here;
+        block values_here SYMRENDER_ALIGNED;
         shade_block(&values_here, x + at, y + at, length, &f, &b, scene->background);
-        found += settle(&values_here, length, values + at, white, at,
-            unsettled + found);
+        found += settle(&values_here, 0, length, values + at, 1, white, at, unsettled + found);
     }
     return found;
 }
@@ -540,12 +681,33 @@ void centred_sphere_stable_enclose(
     const bounds b = bounds_at(scene, &f, x, y, count);
     for (ptrdiff_t at = 0; at < count; at += POINTS) {
         const int length = count - at < POINTS ? (int)(count - at) : POINTS;
-        block values_here;
+        block values_here SYMRENDER_ALIGNED;
         shade_block(&values_here, x + at, y + at, length, &f, &b, scene->background);
         for (int i = 0; i < length; ++i) {
             hi[at + i] = values_here.value[i];
-            lo[at + i] = values_here.rest[i];
+            lo[at + i] = values_here.value_lo[i];
             error[at + i] = values_here.error[i];
         }
     }
+}
+
+ptrdiff_t centred_sphere_stable_batch(
+    double *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_grid *grids, const centred_sphere_stable_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled)
+{
+    const ptrdiff_t height = grids->height, pixels = height * grids->width;
+    ptrdiff_t found = 0;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : (int)height;
+        const ptrdiff_t listed = centred_sphere_stable_rows(
+            images + k * image_stride, stride, &grids[k], &scenes[k], begin, end, unsettled + found);
+        for (ptrdiff_t i = 0; i < listed; ++i)
+            unsettled[found + i] += k * pixels;
+        found += listed;
+    }
+    return found;
 }

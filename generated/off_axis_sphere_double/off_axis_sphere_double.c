@@ -14,9 +14,9 @@
  *          shadow of the sphere on itself: a sphere is convex: where n.l > 0 the way to the light leaves it; where
  *          not, diffuse is 0
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      once: frame 3 mul 3 add 4 div 1 select 41 call
- *          a row: 4 mul 2 add 16 call
- *          a pixel: 47 mul 34 add 2 div 2 sqrt 2 max 2 select 2 call
+ * ops      once: frame 3 mul 3 add 4 div 1 select 42 call
+ *          a row: 5 mul 2 add 16 call
+ *          a pixel: 54 mul 39 add 2 div 2 sqrt 2 max 2 select 2 call
  */
 #include "off_axis_sphere_double.h"
 
@@ -37,7 +37,7 @@ typedef struct {
     double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, tilt_frame,
         diffuse_gain, k_ambient, shininess;
     double_double offset_y, alpha, depth, offset_x, row_mid_frame, row_gap_frame, row_disc_frame, row_half_frame,
-        x_left_frame, image_x, image_y;
+        x_left_frame, image_x, image_y, depth2;
 } frame;
 
 static frame frame_of(const off_axis_sphere_double_scene *scene)
@@ -79,15 +79,15 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
     const double_double depth = dd_div(distance, dd_from(radius));   /* kappa: the same in radii */
     const double_double offset_x = dd_div(dd_from(center_x), dd_from(radius));
     const double_double row_mid_frame = dd_mul_double(depth, focal);   /* what is the same for a frame in row_mid */
-    const double_double share_2 = dd_mul_double(offset_y, focal);
-    const double_double row_gap_frame = dd_neg(share_2);   /* what is the same for a frame in row_gap */
+    const double_double share_3 = dd_mul_double(offset_y, focal);
+    const double_double row_gap_frame = dd_neg(share_3);   /* what is the same for a frame in row_gap */
     const double_double row_disc_frame = dd_product(focal, focal);   /* what is the same for a frame in row_disc */
     /* what is the same for a frame in row_half */
     const double_double row_half_frame = dd_add(alpha, dd_mul(offset_x, offset_x));
     const double_double x_left_frame = dd_div(dd_from(1.0), alpha);   /* what is the same for a frame in x_left */
     /* where the centre appears on the image plane */
     const double_double image_x = dd_div(dd_mul_double(offset_x, focal), depth);
-    const double_double image_y = dd_div(share_2, depth);
+    const double_double image_y = dd_div(share_3, depth);
 
     /* ray and sphere [1 mul] */
     const double d_dot_d_frame = focal * focal;   /* what is the same for a frame in d_dot_d */
@@ -97,6 +97,9 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
 
     /* diffuse [1 mul] */
     const double diffuse_gain = scene->k_diffuse * scene->light_intensity;   /* I_L k_d */
+
+    /* specular [1 call] */
+    const double_double depth2 = dd_mul(depth, depth);
 
     const frame f = {
         .half_exponent = half_exponent,
@@ -121,6 +124,7 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
         .d_dot_d_frame = d_dot_d_frame,
         .tilt_frame = tilt_frame,
         .diffuse_gain = diffuse_gain,
+        .depth2 = depth2,
         .k_ambient = scene->k_ambient,
         .shininess = scene->shininess,
     };
@@ -129,7 +133,7 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double y, s_row, tilt_row, n_y_row, n_z_row;
+    double y, s_row, tilt_row, foot_y_row, foot_z_row, gap2_row;
     double_double x_left, x_right;
 } row;
 
@@ -154,12 +158,15 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     /* normal [3 mul 2 add] */
     const double dy = y - f->image_y.hi - f->image_y.lo;
     const double tilt_row = f->image_x.hi * dy;   /* what is the same for a row in tilt */
-    const double n_y_row = f->focal * dy;   /* what is the same for a row in n_y */
-    const double n_z_row = y * dy;   /* what is the same for a row in n_z */
+    const double foot_y_row = f->focal * dy;   /* what is the same for a row in foot_y */
+    const double foot_z_row = y * dy;   /* what is the same for a row in foot_z */
+
+    /* specular [1 mul] */
+    const double gap2_row = dy * dy;   /* what is the same for a row in gap2 */
 
     const row r = {
-        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row, .tilt_row = tilt_row, .n_y_row = n_y_row,
-        .n_z_row = n_z_row,
+        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row, .tilt_row = tilt_row, .foot_y_row = foot_y_row,
+        .foot_z_row = foot_z_row, .gap2_row = gap2_row,
     };
     return r;
 }
@@ -226,12 +233,14 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
 
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
-    double x[POINTS], facing[POINTS], inv_d2[POINTS], dx[POINTS], tilt[POINTS], n_x[POINTS], n_y[POINTS], n_z[POINTS],
-        w_x[POINTS], w_y[POINTS], w_z[POINTS], w2[POINTS], inv_w2[POINTS], n_dot_l[POINTS], diffuse[POINTS],
-        w_dot_mirror[POINTS], cos2[POINTS], sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
+    double x[POINTS], facing2[POINTS], facing[POINTS], inv_d2[POINTS], dx[POINTS], tilt[POINTS], foot_x[POINTS],
+        n_x[POINTS], foot_y[POINTS], foot_z[POINTS], w_x[POINTS], w_y[POINTS], w_z[POINTS], w2[POINTS], inv_w2[POINTS],
+        diffuse[POINTS], bounce[POINTS], turn[POINTS], w_dot_mirror[POINTS], cos2[POINTS], sin2[POINTS],
+        highlight_log2[POINTS], highlight[POINTS], value[POINTS];
 } block;
 
-/* Stage 1: ray and sphere, normal [10 mul 11 add 1 div 1 sqrt 1 max]. Leaves x, facing, inv_d2, dx, tilt, n_x. */
+/* Stage 1: ray and sphere, normal [10 mul 11 add 1 div 1 sqrt 1 max]. Leaves x, facing2, facing, inv_d2, dx, tilt,
+ * foot_x, n_x. */
 SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
@@ -249,23 +258,29 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, 
     const double inv_d2 = 1.0 / d_dot_d;
     const double dx = x - f->image_x.hi - f->image_x.lo;   /* the pixel seen from the image of the centre */
     const double tilt = f->tilt_frame * (r->tilt_row - dx * f->image_y.hi);
-    /* the foot point (D x (D x m)) / |D|^2 lies on the ray, nearest to the centre; n is it less facing D / |D|^2 */
-    const double n_x = inv_d2 * (f->depth.hi * (f->focal * dx - r->y * tilt) - x * facing);
+    /* F, the foot point of the ray times |D|^2, is at right angles to D */
+    const double foot_x = f->depth.hi * (f->focal * dx - r->y * tilt);
+    const double n_x = inv_d2 * (foot_x - x * facing);   /* n is F less facing D, over |D|^2 */
 
     b->x[i] = x;
+    b->facing2[i] = facing2;
     b->facing[i] = facing;
     b->inv_d2[i] = inv_d2;
     b->dx[i] = dx;
     b->tilt[i] = tilt;
+    b->foot_x[i] = foot_x;
     b->n_x[i] = n_x;
 }
 
-/* Stage 2: normal, light [15 mul 11 add 1 div 1 sqrt]. Leaves n_y, n_z, w_x, w_y, w_z, w2, inv_w2, n_dot_l. */
+/* Stage 2: normal, light, diffuse, specular [20 mul 14 add 1 div 1 sqrt 1 max]. Leaves foot_y, foot_z, w_x, w_y,
+ * w_z, w2, inv_w2, diffuse, bounce, turn. */
 SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
 {
     /* normal [8 mul 4 add] */
-    const double n_y = b->inv_d2[i] * (f->depth.hi * (b->x[i] * b->tilt[i] + r->n_y_row) - r->y * b->facing[i]);
-    const double n_z = b->inv_d2[i] * (f->focal * b->facing[i] + f->depth.hi * (b->x[i] * b->dx[i] + r->n_z_row));
+    const double foot_y = f->depth.hi * (b->x[i] * b->tilt[i] + r->foot_y_row);
+    const double n_y = b->inv_d2[i] * (foot_y - r->y * b->facing[i]);
+    const double foot_z = f->depth.hi * (b->x[i] * b->dx[i] + r->foot_z_row);
+    const double n_z = b->inv_d2[i] * (f->focal * b->facing[i] + foot_z);
 
     /* light [7 mul 7 add 1 div 1 sqrt] */
     const double w_x = f->lamp_x - b->n_x[i];   /* w = (L - P) / R */
@@ -275,39 +290,51 @@ SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
     const double inv_w2 = 1.0 / w2;
     const double n_dot_l = (b->n_x[i] * w_x + n_y * w_y + n_z * w_z) * sqrt(inv_w2);   /* n.l = n.w / |w| */
 
-    b->n_y[i] = n_y;
-    b->n_z[i] = n_z;
+    /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
+    const double diffuse = (n_dot_l > 0.0 ? n_dot_l : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
+
+    /* specular [4 mul 3 add] */
+    const double bounce = 2.0 * b->facing[i];
+    /* |m x D|^2 in radii = |D|^2 - facing^2, free of cancellation */
+    const double gap2 = f->depth2.hi * (b->dx[i] * b->dx[i] + b->tilt[i] * b->tilt[i] + r->gap2_row);
+    const double turn = gap2 - b->facing2[i];   /* -|D|^2 cos 2a, a the angle of incidence */
+
+    b->foot_y[i] = foot_y;
+    b->foot_z[i] = foot_z;
     b->w_x[i] = w_x;
     b->w_y[i] = w_y;
     b->w_z[i] = w_z;
     b->w2[i] = w2;
     b->inv_w2[i] = inv_w2;
-    b->n_dot_l[i] = n_dot_l;
+    b->diffuse[i] = diffuse;
+    b->bounce[i] = bounce;
+    b->turn[i] = turn;
 }
 
-/* Stage 3: diffuse, specular [21 mul 10 add 1 max]. Leaves diffuse, w_dot_mirror, cos2, sin2. */
+/* Stage 3: specular [23 mul 12 add]. Leaves w_dot_mirror, cos2, sin2. */
 SYMRENDER_INLINE void stage_3(const row *r, const frame *f, block *b, int i)
 {
-    /* diffuse [1 mul 1 max]. Phong 1975, Illumination for computer generated pictures */
-    const double diffuse = (b->n_dot_l[i] > 0.0 ? b->n_dot_l[i] : 0.0) * f->diffuse_gain;   /* k_d max(0, n.l) */
-
-    /* specular [20 mul 10 add] */
-    const double bounce = 2.0 * b->facing[i];
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const double mirror_x = b->x[i] + b->n_x[i] * bounce;
-    const double mirror_y = r->y + b->n_y[i] * bounce;
-    const double mirror_z = b->n_z[i] * bounce - f->focal;
-    /* r.v = w . mirror / (|w| |D|) */
+    /* specular [23 mul 12 add] */
+    /* the primary ray mirrored at the surface, times |D|^2 */
+    const double mirror_x = b->foot_x[i] * b->bounce[i] + b->x[i] * b->turn[i];
+    const double mirror_y = b->foot_y[i] * b->bounce[i] + r->y * b->turn[i];
+    const double mirror_z = b->foot_z[i] * b->bounce[i] - f->focal * b->turn[i];
+    /* r.v = w . mirror / (|w| |D|^3) */
     const double w_dot_mirror = b->w_x[i] * mirror_x + b->w_y[i] * mirror_y + b->w_z[i] * mirror_z;
-    const double inv_w2_d2 = b->inv_d2[i] * b->inv_w2[i];
-    const double cos2 = w_dot_mirror * w_dot_mirror * inv_w2_d2;   /* (r.v)^2 */
-    const double side_x = b->w_y[i] * mirror_z - b->w_z[i] * mirror_y;   /* w x mirror, short where the highlight is */
-    const double side_y = b->w_z[i] * mirror_x - b->w_x[i] * mirror_z;
-    const double side_z = b->w_x[i] * mirror_y - b->w_y[i] * mirror_x;
-    /* 1 - (r.v)^2, accurate where r.v is near 1 */
-    const double sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
+    const double along_w = b->inv_w2[i] * w_dot_mirror;   /* mirror = along_w w + across */
+    const double inv_d4 = b->inv_d2[i] * b->inv_d2[i];
+    const double inv_d6 = b->inv_d2[i] * inv_d4;   /* 1 / |mirror|^2 */
+    const double near_cos2 = w_dot_mirror * along_w * inv_d6;   /* (r.v)^2, but for its scale */
+    /* what of mirror is at right angles to w, short where the highlight is */
+    const double across_x = mirror_x - b->w_x[i] * along_w;
+    const double across_y = mirror_y - b->w_y[i] * along_w;
+    const double across_z = mirror_z - b->w_z[i] * along_w;
+    const double near_sin2 = inv_d6 * (across_x * across_x + across_y * across_y + across_z * across_z);
+    /* 1 / (cos^2 + sin^2): 2 - a is 1 / a where a is within rounding of 1 */
+    const double rescale = 2.0 - near_cos2 - near_sin2;
+    const double cos2 = near_cos2 * rescale;   /* (r.v)^2 */
+    const double sin2 = near_sin2 * rescale;   /* 1 - (r.v)^2, accurate where r.v is near 1 */
 
-    b->diffuse[i] = diffuse;
     b->w_dot_mirror[i] = w_dot_mirror;
     b->cos2[i] = cos2;
     b->sin2[i] = sin2;
@@ -407,7 +434,11 @@ void off_axis_sphere_double_rows(double *image, ptrdiff_t stride, const symrende
         const int end = hits.first <= hits.last ? hits.last + 1 : width;
         if (j + 1 < row_end)
             fetch_ahead(out + stride, (size_t)width * sizeof *out);
-        for (int i = 0; i < begin; ++i)
+        /* the background, in whole vectors: it may run into the hits, which are written over it */
+        const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
+        for (int i = 0; i < before; ++i)
+            out[i] = background;
+        for (int i = vectors_begin(end); i < width; ++i)
             out[i] = background;
         for (int at = begin, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
@@ -418,8 +449,6 @@ void off_axis_sphere_double_rows(double *image, ptrdiff_t stride, const symrende
             for (int i = 0; i < count; ++i)
                 out[at + i] = at_most(b.value[i], white);
         }
-        for (int i = end; i < width; ++i)
-            out[i] = background;
     }
 }
 

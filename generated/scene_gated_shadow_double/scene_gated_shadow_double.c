@@ -1111,3 +1111,44 @@ ptrdiff_t scene_gated_shadow_double_points(
     drop(&w);
     return found;
 }
+
+int scene_gated_shadow_double_prepare_many(
+    frame **frames, const scene_type *scenes, ptrdiff_t count, const symrender_grid *grids)
+{
+    for (ptrdiff_t k = 0; k < count; ++k) {
+        frames[k] = scene_gated_shadow_double_prepare(&scenes[k], &grids[k]);
+        if (!frames[k]) {
+            scene_gated_shadow_double_release_many(frames, k);
+            return -1;
+        }
+    }
+    return 0;
+}
+
+void scene_gated_shadow_double_release_many(
+    frame **frames, ptrdiff_t count)
+{
+    for (ptrdiff_t k = 0; k < count; ++k)
+        scene_gated_shadow_double_release(frames[k]);
+}
+
+ptrdiff_t scene_gated_shadow_double_batch(double *const *images, ptrdiff_t stride,
+    frame *const *frames, ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled)
+{
+    const ptrdiff_t height = frames[0]->grid.height, pixels = height * frames[0]->grid.width;
+    ptrdiff_t found = 0;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : (int)height;
+        const ptrdiff_t listed = scene_gated_shadow_double_rows(
+            images[k], stride, frames[k], NULL, begin, end, unsettled ? unsettled + found : NULL);
+        if (listed < 0)
+            return -1;
+        for (ptrdiff_t i = 0; unsettled && i < listed; ++i)
+            unsettled[found + i] += k * pixels;
+        found += listed;
+    }
+    return found;
+}

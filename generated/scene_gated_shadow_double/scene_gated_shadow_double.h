@@ -71,6 +71,19 @@ ptrdiff_t scene_gated_shadow_double_rows(double *image, ptrdiff_t stride,
 ptrdiff_t scene_gated_shadow_double_points(double *values, const double *x, const double *y,
     ptrdiff_t count, const scene_gated_shadow_double_frame *frame, ptrdiff_t *unsettled);
 
+/* Many scenes of one structure, each with its grid: all their frames, or -1 and none where there is no memory. */
+int scene_gated_shadow_double_prepare_many(scene_gated_shadow_double_frame **frames,
+    const scene_gated_shadow_double_scene *scenes, ptrdiff_t count, const symrender_grid *grids);
+void scene_gated_shadow_double_release_many(
+    scene_gated_shadow_double_frame **frames, ptrdiff_t count);
+
+/* Writes rows [row_begin, row_end) of many images of one size, counted through: row j of image k is row k * height + j
+ * and starts at images[k] + j * stride. `unsettled`, and what is returned, as for rows, with the pixels counted
+ * through: (k * height + row) * width + column. */
+ptrdiff_t scene_gated_shadow_double_batch(double *const *images, ptrdiff_t stride,
+    scene_gated_shadow_double_frame *const *frames, ptrdiff_t row_begin, ptrdiff_t row_end,
+    ptrdiff_t *unsettled);
+
 #ifdef __cplusplus
 }
 #endif

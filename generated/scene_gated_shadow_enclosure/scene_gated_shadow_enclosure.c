@@ -359,12 +359,12 @@ SYMRENDER_INLINE void near_surface(site *at, const ray *r, const near_sphere *sp
     /* normal [21 call] */
     const ball inv_d2 = ball_div(ball_from(1.0), d_dot_d);
     /* the foot point (D x (D x m)) / |D|^2 lies on the ray, nearest to the centre; n is it less facing D / |D|^2 */
-    const ball n_x = ball_mul(ball_sub(ball_neg(ball_mul_double(cross_y, sphere->focal)),
-        ball_add(ball_mul_double(cross_z, r->y), ball_mul_double(facing, r->x))), inv_d2);
-    const ball n_y = ball_mul(ball_sub(ball_add(ball_mul_double(cross_x, sphere->focal),
-        ball_mul_double(cross_z, r->x)), ball_mul_double(facing, r->y)), inv_d2);
-    const ball n_z = ball_mul(ball_sub(ball_add(ball_mul_double(cross_x, r->y),
-        ball_mul_double(facing, sphere->focal)), ball_mul_double(cross_y, r->x)), inv_d2);
+    const ball foot_x = ball_sub(ball_neg(ball_mul_double(cross_y, sphere->focal)), ball_mul_double(cross_z, r->y));
+    const ball n_x = ball_mul(inv_d2, ball_sub(foot_x, ball_mul_double(facing, r->x)));
+    const ball foot_y = ball_add(ball_mul_double(cross_x, sphere->focal), ball_mul_double(cross_z, r->x));
+    const ball n_y = ball_mul(inv_d2, ball_sub(foot_y, ball_mul_double(facing, r->y)));
+    const ball foot_z = ball_sub(ball_mul_double(cross_x, r->y), ball_mul_double(cross_y, r->x));
+    const ball n_z = ball_mul(inv_d2, ball_add(ball_mul_double(facing, sphere->focal), foot_z));
 
     /* specular [7 call] */
     const ball bounce = ball_mul_double(facing, 2.0);
@@ -590,5 +590,18 @@ int scene_gated_shadow_enclosure_points(double *hi, double *lo, double *error,
         }
     }
     drop(&h);
+    return 0;
+}
+
+int scene_gated_shadow_enclosure_batch(double *hi, double *lo, double *error,
+    const double *x, const double *y, const ptrdiff_t *begin, const scene_gated_shadow_enclosure_scene *scenes, ptrdiff_t count)
+{
+    for (ptrdiff_t k = 0; k < count; ++k) {
+        const ptrdiff_t at = begin[k], points = begin[k + 1] - at;
+        if (points > 0
+            && scene_gated_shadow_enclosure_points(hi + at * 1, lo + at * 1, error + at * 1,
+                x + at, y + at, points, &scenes[k]))
+            return -1;
+    }
     return 0;
 }

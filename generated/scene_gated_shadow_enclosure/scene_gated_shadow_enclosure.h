@@ -43,6 +43,10 @@ typedef struct {
 int scene_gated_shadow_enclosure_points(double *hi, double *lo, double *error,
     const double *x, const double *y, ptrdiff_t count, const scene_gated_shadow_enclosure_scene *scene);
 
+/* The same for many scenes of one structure: points begin[k] <= i < begin[k + 1] are those of scene k, k < count. */
+int scene_gated_shadow_enclosure_batch(double *hi, double *lo, double *error, const double *x, const double *y,
+    const ptrdiff_t *begin, const scene_gated_shadow_enclosure_scene *scenes, ptrdiff_t count);
+
 #ifdef __cplusplus
 }
 #endif

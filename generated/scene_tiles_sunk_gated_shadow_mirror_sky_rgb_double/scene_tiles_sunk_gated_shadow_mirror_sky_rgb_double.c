@@ -33,9 +33,9 @@
  *          shadow of the plane: 2 of 2 lights on the eye's side of the plane, as is all that is seen
  *          lights that fade with distance: every light that lights anything is as strong at every distance
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      span: a frame: 3 mul 1 div 4 call, a sphere: 10 mul 7 add 3 div 2 sqrt 2 max 34 call, a row: 21 mul 12
- *            add 1 sqrt 2 max 18 call, a pixel: 24 mul 21 add 2 div 2 sqrt 1 max
- *          plane: a frame: 3 mul 3 call, a row: 3 mul 1 call, a pixel: 11 mul 14 add 5 div 2 sqrt 2 call
+ * ops      span: a frame: 3 mul 1 div 8 call, a sphere: 10 mul 9 add 3 div 3 sqrt 3 max 34 call, a row: 21 mul 12
+ *            add 1 sqrt 2 max 24 call, a pixel: 25 mul 33 add 3 div 2 sqrt 1 max 42 call
+ *          plane: a frame: 3 mul 7 call, a row: 3 mul 3 call, a pixel: 10 mul 25 add 5 div 1 sqrt 19 call
  *          tiles: a frame: 2 add, a pixel: 9 mul 14 add 1 max 5 call
  *          lamp: a sphere: 3 add 3 div 6 call
  *          reach: a pixel: 6 mul 5 add
@@ -44,8 +44,9 @@
  *          gate: a pixel: 7 mul 3 add
  *          shadow: a pixel: 20 mul 15 add 1 select 1 call
  *          echo: a pixel: 24 mul 19 add 1 div 1 sqrt 1 max 1 call
- *          arrival: a pixel: 45 mul 28 add 3 div 2 sqrt 2 max
- *          echo_plane: a pixel: 30 mul 21 add 3 div 4 call
+ *          arrival: a sphere: 12 call, a pixel: 14 mul 8 add 2 div 1 sqrt 1 max 66 call
+ *          echo_plane: a pixel: 28 mul 21 add 3 div 4 call
+ *          landing: a frame: 3 call, a sphere: 9 call, a pixel: 14 mul 9 add 2 div 1 sqrt 47 call
  *          gradient: a pixel: 7 mul 5 add 1 div 1 sqrt
  */
 #include "scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double.h"
@@ -55,6 +56,7 @@
 #include "units.h"
 #include "phong_power.h"
 #include "double_double.h"
+#include "pair.h"
 #include "exact_sign.h"
 #include <math.h>
 #include <stdlib.h>
@@ -99,9 +101,10 @@ typedef struct {
     double lobe[POINTS], shininess[POINTS];   /* max(0, r.v)^n, and n */
     double margin[POINTS];    /* by how much the closest of its decisions is sure; in doubt where it is not positive */
     double error[POINTS];     /* what rounding may have done to the value, in units of 2^-53 */
-    double blur[POINTS];      /* how far rounding moves it, in units of GRAIN; of a sphere that the eye sees: 1 */
-    double drift[POINTS];     /* how far it moves its mirrored ray aside, */
-    double turn[POINTS];      /* and how much it turns that and its normal; seen by the eye: 1 */
+    double blur[POINTS];      /* how far rounding moves it, in units of GRAIN; on a sphere: 1 */
+    double p_x_low[POINTS], p_y_low[POINTS], p_z_low[POINTS];   /* what rounding left of the point, */
+    double mirror_x_low[POINTS], mirror_y_low[POINTS], mirror_z_low[POINTS];   /* and of the ray mirrored there; */
+    double turn[POINTS];      /* how far both may be off still, in units of 2^-100 */
     double nearest[POINTS];   /* the distance of what is seen in this point's mirror, in lengths of its ray, */
     ptrdiff_t seen[POINTS];   /* and which receiver it is, in a number as wide; -1: none */
     double weight[POINTS];    /* how much of this point is added */
@@ -116,6 +119,9 @@ static const double GRAIN = 0x1p-44;
 /* Units of 2^-53 that an intensity of at most 1 may be off: below 1e-15. */
 static const double MOST_ROUNDOFFS = 9.1;
 
+/* Units of 2^-100 that a mirrored point and its ray may be off: far below what rounding them does. */
+static const double MOST_TURN = 0x1.0000000000000p+40;
+
 static inline double least(double a, double b)
 {
     return a < b ? a : b;
@@ -126,7 +132,7 @@ static inline double least(double a, double b)
 /* What does not change within a frame. */
 typedef struct {
     double plane_unit, focal, d_dot_d_frame, tilt_frame, most_disc_frame, eye;
-    double_double row_disc_frame;
+    double_double row_disc_frame, full_d_dot_d_frame, full_tilt_frame;
 } span_frame;
 
 static span_frame span_frame_of(const scene_type *scene)
@@ -140,12 +146,16 @@ static span_frame span_frame_of(const scene_type *scene)
     const double focal = ldexp(scene->eye, plane_exponent);
     const double_double row_disc_frame = dd_product(focal, focal);   /* what is the same for a frame in row_disc */
 
-    /* ray and sphere [1 mul] */
+    /* ray and sphere [1 mul 1 call] */
     const double share_2 = focal * focal;
     const double d_dot_d_frame = share_2;   /* what is the same for a frame in d_dot_d */
+    /* what is the same for a frame in full_d_dot_d */
+    const double_double full_d_dot_d_frame = dd_product(focal, focal);
 
-    /* normal [1 div] */
+    /* normal [1 div 3 call] */
     const double tilt_frame = 1.0 / focal;   /* what is the same for a frame in tilt */
+    /* what is the same for a frame in full_tilt */
+    const double_double full_tilt_frame = dd_div(dd_from(1.0), dd_from(focal));
 
     /* outline [2 mul] */
     /* what is the same for a frame in most_disc */
@@ -156,7 +166,9 @@ static span_frame span_frame_of(const scene_type *scene)
         .focal = focal,
         .row_disc_frame = row_disc_frame,
         .d_dot_d_frame = d_dot_d_frame,
+        .full_d_dot_d_frame = full_d_dot_d_frame,
         .tilt_frame = tilt_frame,
+        .full_tilt_frame = full_tilt_frame,
         .most_disc_frame = most_disc_frame,
         .eye = scene->eye,
     };
@@ -168,7 +180,7 @@ typedef struct {
     double_double offset_y, alpha, depth, offset_x, row_mid_sphere, row_gap_sphere, row_half_sphere, x_left_sphere,
         image_x, image_y, power;
     double row_low, row_high, ahead_sphere, gap_room_sphere, plain_gap_sphere, most_half_sphere, most_half_sphere_1,
-        most_half_sphere_2, outline_left_sphere;
+        most_half_sphere_2, outline_left_sphere, turned_sphere;
 } span_sphere;
 
 static span_sphere span_sphere_of(const scene_type *scene, int k, const span_frame *f)
@@ -191,38 +203,42 @@ static span_sphere span_sphere_of(const scene_type *scene, int k, const span_fra
     const double_double offset_x = dd_div(dd_from(center_x), dd_from(radius));
     /* what is the same for a sphere in row_mid */
     const double_double row_mid_sphere = dd_mul_double(depth, f->focal);
-    const double_double share_11 = dd_mul_double(offset_y, f->focal);
-    const double_double row_gap_sphere = dd_neg(share_11);   /* what is the same for a sphere in row_gap */
-    const double_double share_12 = dd_add(alpha, dd_mul(offset_x, offset_x));
-    const double_double row_half_sphere = share_12;   /* what is the same for a sphere in row_half */
+    const double_double share_12 = dd_mul_double(offset_y, f->focal);
+    const double_double row_gap_sphere = dd_neg(share_12);   /* what is the same for a sphere in row_gap */
+    const double_double share_13 = dd_add(alpha, dd_mul(offset_x, offset_x));
+    const double_double row_half_sphere = share_13;   /* what is the same for a sphere in row_half */
     const double_double x_left_sphere = dd_div(dd_from(1.0), alpha);   /* what is the same for a sphere in x_left */
     /* where the centre appears on the image plane */
     const double_double image_x = dd_div(dd_mul_double(offset_x, f->focal), depth);
-    const double_double image_y = dd_div(share_11, depth);
+    const double_double image_y = dd_div(share_12, depth);
     /* kappa^2 - 1 */
     const double height2 = (distance.hi - radius + distance.lo) * (radius + distance.hi + distance.lo)
         / (radius * radius);
-    const double share_4 = offset_y.hi * depth.hi;
-    const double share_5 = sqrt(alpha.hi > 0.0 ? alpha.hi : 0.0);
-    const double share_6 = f->focal / height2;
-    const double row_low = (share_4 - share_5) * share_6;   /* the rows that meet the silhouette: row_disc = 0 */
-    const double row_high = (share_4 + share_5) * share_6;
+    const double share_5 = offset_y.hi * depth.hi;
+    const double share_6 = sqrt(alpha.hi > 0.0 ? alpha.hi : 0.0);
+    const double share_7 = f->focal / height2;
+    const double row_low = (share_5 - share_6) * share_7;   /* the rows that meet the silhouette: row_disc = 0 */
+    const double row_high = (share_5 + share_6) * share_7;
 
     /* distance [1 mul] */
-    const double_double power = share_12;   /* |m|^2 - 1: the power of the eye in radii, squared */
+    const double_double power = share_13;   /* |m|^2 - 1: the power of the eye in radii, squared */
     const double ahead_sphere = f->focal * depth.hi;   /* what is the same for a sphere in ahead */
 
     /* outline [4 mul 1 add 1 div 1 sqrt 1 max 2 call] */
-    const double share_7 = fabs(offset_y.hi);
+    const double share_8 = fabs(offset_y.hi);
     /* what is the same for a sphere in gap_room */
-    const double gap_room_sphere = 3.552713678800501e-15 * f->focal * share_7;
+    const double gap_room_sphere = 3.552713678800501e-15 * f->focal * share_8;
     const double plain_gap_sphere = -(offset_y.hi * f->focal);   /* what is the same for a sphere in plain_gap */
     const double most_half_sphere = fabs(offset_x.hi);   /* what is the same for a sphere in most_half */
-    const double most_half_sphere_1 = share_7;   /* what is the same for a sphere in most_half */
+    const double most_half_sphere_1 = share_8;   /* what is the same for a sphere in most_half */
     /* what is the same for a sphere in most_half */
     const double most_half_sphere_2 = sqrt(alpha.hi + offset_x.hi * offset_x.hi > 0.0 ? alpha.hi + offset_x.hi
         * offset_x.hi : 0.0);
     const double outline_left_sphere = 1.0 / alpha.hi;   /* what is the same for a sphere in outline_left */
+
+    /* margin [2 add 1 sqrt 1 max] */
+    /* what is the same for a sphere in turned */
+    const double turned_sphere = sqrt(1.0 + power.hi + power.lo > 0.0 ? 1.0 + power.hi + power.lo : 0.0);
 
     const span_sphere carried = {
         .offset_y = offset_y,
@@ -245,6 +261,7 @@ static span_sphere span_sphere_of(const scene_type *scene, int k, const span_fra
         .most_half_sphere_1 = most_half_sphere_1,
         .most_half_sphere_2 = most_half_sphere_2,
         .outline_left_sphere = outline_left_sphere,
+        .turned_sphere = turned_sphere,
     };
     return carried;
 }
@@ -252,7 +269,7 @@ static span_sphere span_sphere_of(const scene_type *scene, int k, const span_fra
 /* What does not change within a row. */
 typedef struct {
     double y, s_row, tilt_row, n_y_row, n_z_row, ahead_row;
-    double_double x_left, x_right;
+    double_double x_left, x_right, full_s_row, full_tilt_row, full_n_y_row, full_n_z_row;
 } span_row;
 
 SYMRENDER_INLINE span_row span_row_of(double y, const span_sphere *ball, const span_frame *f)
@@ -271,15 +288,20 @@ SYMRENDER_INLINE span_row span_row_of(double y, const span_sphere *ball, const s
     const double_double x_left = dd_mul(dd_sub(row_mid, row_half), ball->x_left_sphere);
     const double_double x_right = dd_mul(dd_add(row_mid, row_half), ball->x_left_sphere);
 
-    /* ray and sphere [1 mul] */
+    /* ray and sphere [1 mul 1 call] */
     const double share_1 = y * y;
     const double s_row = share_1;   /* what is the same for a row in s */
+    const double_double full_s_row = dd_product(y, y);   /* what is the same for a row in full_s */
 
-    /* normal [3 mul 2 add] */
+    /* normal [3 mul 2 add 5 call] */
     const double dy = y - ball->image_y.hi - ball->image_y.lo;
+    const double_double full_dy = dd_add_double(dd_neg(ball->image_y), y);
     const double tilt_row = ball->image_x.hi * dy;   /* what is the same for a row in tilt */
+    const double_double full_tilt_row = dd_mul(ball->image_x, full_dy);   /* what is the same for a row in full_tilt */
     const double n_y_row = f->focal * dy;   /* what is the same for a row in n_y */
+    const double_double full_n_y_row = dd_mul_double(full_dy, f->focal);   /* what is the same for a row in full_n_y */
     const double n_z_row = y * dy;   /* what is the same for a row in n_z */
+    const double_double full_n_z_row = dd_mul_double(full_dy, y);   /* what is the same for a row in full_n_z */
 
     /* distance [1 mul] */
     const double share_3 = y * ball->offset_y.hi;
@@ -290,9 +312,13 @@ SYMRENDER_INLINE span_row span_row_of(double y, const span_sphere *ball, const s
         .x_left = x_left,
         .x_right = x_right,
         .s_row = s_row,
+        .full_s_row = full_s_row,
         .tilt_row = tilt_row,
+        .full_tilt_row = full_tilt_row,
         .n_y_row = n_y_row,
+        .full_n_y_row = full_n_y_row,
         .n_z_row = n_z_row,
+        .full_n_z_row = full_n_z_row,
         .ahead_row = ahead_row,
     };
     return carried;
@@ -310,9 +336,9 @@ static int span_is_left(
     const double share_3 = y * ball->offset_y.hi;
 
     /* outline [16 mul 10 add 1 sqrt 2 max 2 call] */
-    const double share_8 = fabs(y);
+    const double share_9 = fabs(y);
     /* what rounding may do */
-    const double gap_room = ball->gap_room_sphere + 3.552713678800501e-15 * ball->depth.hi * share_8;
+    const double gap_room = ball->gap_room_sphere + 3.552713678800501e-15 * ball->depth.hi * share_9;
     const double plain_gap = fabs(y * ball->depth.hi + ball->plain_gap_sphere);   /* |row_gap| in plain float64 */
     const double less_gap = plain_gap - gap_room;
     const double least_gap = less_gap > 0.0 ? less_gap : 0.0;   /* at most |row_gap| */
@@ -321,12 +347,12 @@ static int span_is_left(
         * least_gap;
     /* at least row_half, and the rounding of the middle */
     const double most_half = 3.552713678800501e-15 * ball->most_half_sphere
-        * (ball->ahead_sphere + share_8 * ball->most_half_sphere_1) + 3.552713678800501e-15 * 281474976710657.0
+        * (ball->ahead_sphere + share_9 * ball->most_half_sphere_1) + 3.552713678800501e-15 * 281474976710657.0
         * sqrt(most_disc > 0.0 ? most_disc : 0.0) * ball->most_half_sphere_2;
-    const double share_9 = ball->ahead_sphere + share_3;
+    const double share_10 = ball->ahead_sphere + share_3;
     /* every hit lies between these */
-    const double outline_left = ball->outline_left_sphere * (ball->offset_x.hi * share_9 - most_half);
-    const double outline_right = ball->outline_left_sphere * (most_half + ball->offset_x.hi * share_9);
+    const double outline_left = ball->outline_left_sphere * (ball->offset_x.hi * share_10 - most_half);
+    const double outline_right = ball->outline_left_sphere * (most_half + ball->offset_x.hi * share_10);
 
     const pixel_span outline
         = span_between(outline_left * steps - left - 1.0, outline_right * steps - left + 1.0, width);
@@ -352,8 +378,9 @@ static inline double span_distance(double x, const span_row *r, const span_spher
 
     /* distance [2 mul 3 add 1 div 1 sqrt]. t_1 t_2 = (|m|^2 - R^2) / |D|^2 (Vieta) */
     const double ahead = x * ball->offset_x.hi + ball->ahead_sphere + r->ahead_row;   /* m.D */
+    const double share_4 = sqrt(d_dot_d);
     /* |P - E| in radii: the nearer root as a quotient, free of cancellation */
-    const double hit_distance = sqrt(d_dot_d) * ball->power.hi / (facing + ahead);
+    const double hit_distance = ball->power.hi * share_4 / (facing + ahead);
 
     return hit_distance;
 }
@@ -419,34 +446,72 @@ static void span_surface(points *p, int at, int count, double first, double step
     for (int i = 0; i < padded(count); ++i) {
         const double x = (first + i) * step;
 
-        /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
+        /* ray and sphere [3 mul 6 add 1 sqrt 1 max 10 call] */
         /* distance to the two ends of the span, not negative inside it */
         const double from_left = x - r->x_left.hi - r->x_left.lo;
+        const double_double full_from_left = dd_add_double(dd_neg(r->x_left), x);
         const double to_right = r->x_right.hi - x + r->x_right.lo;
+        const double_double full_to_right = dd_add_double(r->x_right, -x);
         const double chord = from_left * to_right;
+        const double_double full_chord = pair_mul(full_from_left, full_to_right);
         /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
         const double facing2 = ball->alpha.hi * chord;
+        const double_double full_facing2 = pair_mul(ball->alpha, full_chord);
         const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+        const double_double full_s = pair_add(dd_product(x, x), r->full_s_row);
         const double d_dot_d = s + f->d_dot_d_frame;
+        const double_double full_d_dot_d = pair_add(full_s, f->full_d_dot_d_frame);
         /* -n.D, how far the surface faces the ray: root / R */
         const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);
+        const double_double full_facing = pair_sqrt(pair_positive_part(full_facing2));
 
-        /* normal [15 mul 9 add 1 div] */
+        /* normal [15 mul 15 add 1 div 25 call] */
         const double inv_d2 = 1.0 / d_dot_d;
+        const double_double full_inv_d2 = pair_inverse(full_d_dot_d);
         const double dx = x - ball->image_x.hi - ball->image_x.lo;   /* the pixel seen from the image of the centre */
+        const double_double full_dx = pair_add_double(dd_neg(ball->image_x), x);
         const double tilt = f->tilt_frame * (r->tilt_row - dx * ball->image_y.hi);
+        const double_double full_tilt = pair_mul(f->full_tilt_frame,
+            pair_sub(r->full_tilt_row, pair_mul(full_dx, ball->image_y)));
         /* the foot point (D x (D x m)) / |D|^2 lies on the ray, nearest to the centre; n is it less facing D /
          * |D|^2 */
         const double n_x = inv_d2 * (ball->depth.hi * (f->focal * dx - r->y * tilt) - x * facing);
+        const double_double full_n_x = pair_mul(full_inv_d2,
+            pair_sub(pair_mul(ball->depth,
+            pair_sub(pair_mul_double(full_dx, f->focal), pair_mul_double(full_tilt, r->y))),
+            pair_mul_double(full_facing, x)));
+        const double n_x_low = full_n_x.hi - n_x + full_n_x.lo;   /* what rounding left */
         const double n_y = inv_d2 * (ball->depth.hi * (x * tilt + r->n_y_row) - r->y * facing);
+        const double_double full_n_y = pair_mul(full_inv_d2,
+            pair_sub(pair_mul(ball->depth, pair_add(pair_mul_double(full_tilt, x), r->full_n_y_row)),
+            pair_mul_double(full_facing, r->y)));
+        const double n_y_low = full_n_y.hi - n_y + full_n_y.lo;
         const double n_z = inv_d2 * (f->focal * facing + ball->depth.hi * (x * dx + r->n_z_row));
+        const double_double full_n_z = pair_mul(full_inv_d2,
+            pair_add(pair_mul_double(full_facing, f->focal),
+            pair_mul(ball->depth, pair_add(pair_mul_double(full_dx, x), r->full_n_z_row))));
+        const double n_z_low = full_n_z.hi - n_z + full_n_z.lo;
 
-        /* specular [4 mul 3 add] */
+        /* specular [4 mul 9 add 7 call] */
         const double bounce = 2.0 * facing;
+        const double_double full_bounce = dd_scale(full_facing, 2.0);
         /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
         const double mirror_x = x + n_x * bounce;
+        const double_double full_mirror_x = pair_add_double(pair_mul(full_n_x, full_bounce), x);
+        const double mirror_x_low = full_mirror_x.hi - mirror_x + full_mirror_x.lo;
         const double mirror_y = r->y + n_y * bounce;
+        const double_double full_mirror_y = pair_add_double(pair_mul(full_n_y, full_bounce), r->y);
+        const double mirror_y_low = full_mirror_y.hi - mirror_y + full_mirror_y.lo;
         const double mirror_z = n_z * bounce - f->focal;
+        const double_double full_mirror_z = pair_add_double(pair_mul(full_n_z, full_bounce), -f->focal);
+        const double mirror_z_low = full_mirror_z.hi - mirror_z + full_mirror_z.lo;
+
+        /* distance [1 sqrt] */
+        const double share_4 = sqrt(d_dot_d);
+
+        /* margin [1 mul 1 div] */
+        /* at grazing rays, and far away, two words are less exact */
+        const double turned = share_4 * ball->turned_sphere / facing;
 
         p->n_x[at + i] = n_x;
         p->n_y[at + i] = n_y;
@@ -458,6 +523,13 @@ static void span_surface(points *p, int at, int count, double first, double step
         p->mirror_y[at + i] = mirror_y;
         p->mirror_z[at + i] = mirror_z;
         p->inv_d2[at + i] = inv_d2;
+        p->turn[at + i] = turned;
+        p->p_x_low[at + i] = n_x_low;
+        p->p_y_low[at + i] = n_y_low;
+        p->p_z_low[at + i] = n_z_low;
+        p->mirror_x_low[at + i] = mirror_x_low;
+        p->mirror_y_low[at + i] = mirror_y_low;
+        p->mirror_z_low[at + i] = mirror_z_low;
     }
 }
 
@@ -466,6 +538,7 @@ static void span_surface(points *p, int at, int count, double first, double step
 /* What does not change within a frame. */
 typedef struct {
     double plane_unit, focal, descent_frame, d_dot_d_frame, n_x, n_y, n_z, margin_frame, plane_x, plane_y, plane_z;
+    double_double full_plane_x, full_plane_y, full_plane_z, full_descent_frame;
 } plane_frame;
 
 static plane_frame plane_frame_of(const scene_type *scene)
@@ -474,10 +547,17 @@ static plane_frame plane_frame_of(const scene_type *scene)
     const int plane_exponent = unit_exponent(scene->eye);   /* f = e 2^k in [1, 2) */
     const double plane_unit = ldexp(1, plane_exponent);
 
-    /* ground plane [2 mul 1 call] */
+    /* inputs in full [3 call] */
+    const double_double full_plane_x = dd_sum(scene->plane_x, scene->plane_x_low);
+    const double_double full_plane_y = dd_sum(scene->plane_y, scene->plane_y_low);
+    const double_double full_plane_z = dd_sum(scene->plane_z, scene->plane_z_low);
+
+    /* ground plane [2 mul 2 call] */
     /* rays D = (x, y, -f): f is e, in the unit of the image plane */
     const double focal = ldexp(scene->eye, plane_exponent);
     const double descent_frame = scene->plane_z * focal;   /* what is the same for a frame in descent */
+    /* what is the same for a frame in full_descent */
+    const double_double full_descent_frame = dd_mul_double(full_plane_z, focal);
     const double d_dot_d_frame = focal * focal;   /* what is the same for a frame in d_dot_d */
     const double n_x = scene->plane_x;   /* its normal, towards the eye */
     const double n_y = scene->plane_y;
@@ -488,8 +568,12 @@ static plane_frame plane_frame_of(const scene_type *scene)
 
     const plane_frame carried = {
         .plane_unit = plane_unit,
+        .full_plane_x = full_plane_x,
+        .full_plane_y = full_plane_y,
+        .full_plane_z = full_plane_z,
         .focal = focal,
         .descent_frame = descent_frame,
+        .full_descent_frame = full_descent_frame,
         .d_dot_d_frame = d_dot_d_frame,
         .n_x = n_x,
         .n_y = n_y,
@@ -505,12 +589,15 @@ static plane_frame plane_frame_of(const scene_type *scene)
 /* What does not change within a row. */
 typedef struct {
     double y, descent_row, d_dot_d_row, margin_row;
+    double_double full_descent_row;
 } plane_row;
 
 SYMRENDER_INLINE plane_row plane_row_of(double y, const plane_frame *f)
 {
-    /* ground plane [2 mul] */
+    /* ground plane [2 mul 2 call] */
     const double descent_row = -(f->plane_y * y);   /* what is the same for a row in descent */
+    /* what is the same for a row in full_descent */
+    const double_double full_descent_row = dd_neg(dd_mul_double(f->full_plane_y, y));
     const double d_dot_d_row = y * y;   /* what is the same for a row in d_dot_d */
 
     /* margin [1 mul 1 call] */
@@ -519,6 +606,7 @@ SYMRENDER_INLINE plane_row plane_row_of(double y, const plane_frame *f)
     const plane_row carried = {
         .y = y,
         .descent_row = descent_row,
+        .full_descent_row = full_descent_row,
         .d_dot_d_row = d_dot_d_row,
         .margin_row = margin_row,
     };
@@ -544,23 +632,38 @@ static void plane_surface(points *p, int at, int count, double first, double ste
     for (int i = 0; i < padded(count); ++i) {
         const double x = (first + i) * step;
 
-        /* ground plane [6 mul 7 add 4 div] */
+        /* ground plane [6 mul 19 add 4 div 17 call] */
         /* -n.D: the ray meets the plane where it is positive */
         const double descent = f->descent_frame + r->descent_row - f->plane_x * x;
+        const double_double full_descent = pair_sub(pair_add(f->full_descent_frame, r->full_descent_row),
+            pair_mul_double(f->full_plane_x, x));
         const double p_x = x / descent;   /* P - E = D / -n.D, in heights of the eye above the plane */
+        const double_double full_p_x = pair_div(dd_from(x), full_descent);
+        const double p_x_low = full_p_x.hi - p_x + full_p_x.lo;   /* what rounding left */
         const double p_y = r->y / descent;
+        const double_double full_p_y = pair_div(dd_from(r->y), full_descent);
+        const double p_y_low = full_p_y.hi - p_y + full_p_y.lo;
         const double p_z = -(f->focal / descent);
+        const double_double full_p_z = dd_neg(pair_div(dd_from(f->focal), full_descent));
+        const double p_z_low = full_p_z.hi - p_z + full_p_z.lo;
         const double d_dot_d = x * x + f->d_dot_d_frame + r->d_dot_d_row;   /* |D|^2 */
         const double inv_d2 = 1.0 / d_dot_d;
         const double bounce = 2.0 * descent;
+        const double_double full_bounce = dd_scale(full_descent, 2.0);
         const double mirror_x = x + f->plane_x * bounce;   /* the ray mirrored at the plane */
+        const double_double full_mirror_x = pair_add_double(pair_mul(f->full_plane_x, full_bounce), x);
+        const double mirror_x_low = full_mirror_x.hi - mirror_x + full_mirror_x.lo;
         const double mirror_y = r->y + f->plane_y * bounce;
+        const double_double full_mirror_y = pair_add_double(pair_mul(f->full_plane_y, full_bounce), r->y);
+        const double mirror_y_low = full_mirror_y.hi - mirror_y + full_mirror_y.lo;
         const double mirror_z = f->plane_z * bounce - f->focal;
+        const double_double full_mirror_z = pair_add_double(pair_mul(f->full_plane_z, full_bounce), -f->focal);
+        const double mirror_z_low = full_mirror_z.hi - mirror_z + full_mirror_z.lo;
 
-        /* margin [4 mul 4 add 1 sqrt] */
-        const double share_2 = p_x * p_x + p_y * p_y + p_z * p_z;
-        const double blurred = 1.0 + share_2;   /* far away rounding moves the point along the ray by |p|^2 */
-        const double drifted = 1.0 + 2.0 * sqrt(share_2);   /* and the mirrored ray aside by |p| */
+        /* margin [3 mul 3 add] */
+        /* far away rounding moves the point along the ray by |p|^2 */
+        const double blurred = 1.0 + p_x * p_x + p_y * p_y + p_z * p_z;
+        const double turned = blurred;   /* and so what two words leave */
 
         p->n_x[at + i] = f->n_x;
         p->n_y[at + i] = f->n_y;
@@ -573,7 +676,13 @@ static void plane_surface(points *p, int at, int count, double first, double ste
         p->mirror_z[at + i] = mirror_z;
         p->inv_d2[at + i] = inv_d2;
         p->blur[at + i] = blurred;
-        p->drift[at + i] = drifted;
+        p->turn[at + i] = turned;
+        p->p_x_low[at + i] = p_x_low;
+        p->p_y_low[at + i] = p_y_low;
+        p->p_z_low[at + i] = p_z_low;
+        p->mirror_x_low[at + i] = mirror_x_low;
+        p->mirror_y_low[at + i] = mirror_y_low;
+        p->mirror_z_low[at + i] = mirror_z_low;
     }
 }
 
@@ -588,7 +697,6 @@ typedef struct {
     double diffuse_gain[CHANNELS], specular_gain[CHANNELS];   /* I_L k_d, I_L k_s */
     double keen;                     /* how much closeness magnifies what rounding moves a point by, times GRAIN */
     double matte_error, gloss_error; /* what it does to the terms, in units of 2^-53 */
-    double turned_error;             /* and to the first, beyond a mirror that turned the normal with the ray */
     double steepness;                /* to the highlight: min(1, steepness * highlight) of that */
     int light, terms;
 } lamp;
@@ -613,7 +721,6 @@ static void set_estimates(lamp *l, const scene_type *scene, int k)
         specular = l->specular_gain[c] > specular ? l->specular_gain[c] : specular;
     }
     l->matte_error = 3.0 * diffuse / away;
-    l->turned_error = k < scene->spheres ? 3.4 * diffuse : 0.0;
     /* a narrow highlight c^n is steep only where it is bright: n c^(n-1) sin is at most sqrt(n) min(0.61, 3.8 c^n) */
     const double n = scene->shininess[k];
     const int is_narrow = n >= 8.0;
@@ -814,13 +921,11 @@ static void accumulate(points *p, const run *r, const lamp *l)
         }
     }
     const double matte_error = l->matte_error, gloss_error = l->gloss_error, steepness = l->steepness;
-    const double turned_error = l->turned_error;
     for (int i = r->at; i < r->at + padded(r->count); ++i) {
         const double matte = p->cosine[i] > 0.0 ? matte_error : 0.0;
         const double steep = l->terms & SPECULAR ? gloss_error * least(1.0, steepness * p->lobe[i]) : 0.0;
         const double told = matte + steep;
-        const double turned = p->turn[i] - 1.0;
-        p->error[i] += p->light[i] * (told + turned * (told + turned_error));
+        p->error[i] += p->light[i] * told;
     }
     for (int c = 0; c < CHANNELS; ++c) {
         const double diffuse_gain = l->diffuse_gain[c], specular_gain = l->specular_gain[c];
@@ -926,7 +1031,7 @@ static void find_in_mirror(points *p, const run *q, int k, const scene_type *sce
         const double t = reach * (m_x * m_x + m_y * m_y + m_z * m_z - 1.0) / (ahead + facing);
 
         /* margin [2 mul 2 add 1 call] */
-        const double margin = fabs(disc) - keen * (p->drift[i] + p->turn[i]) * d2;   /* not above 0: in doubt */
+        const double margin = fabs(disc) - keen * (1.0 + p->blur[i]) * d2;   /* not above 0: in doubt */
 
         const int is_nearer = (disc >= 0.0) & (ahead > 0.0) & (t < p->nearest[i]);
         const int is_tie = (disc >= 0.0) & (ahead > 0.0) & (fabs(t - p->nearest[i]) < 0x1p-24 * t);
@@ -937,61 +1042,99 @@ static void find_in_mirror(points *p, const run *q, int k, const scene_type *sce
 }
 
 /* Normal and next mirrored ray of a new run: where the rays of the points that it is seen in meet its sphere. */
-static void arrive(points *child, const run *q, const points *p, int of, const scene_type *scene)
+static void arrive(
+    points *restrict child, const run *q, const points *restrict p, int of, const scene_type *scene)
 {
     const int k = q->receiver;
-    const double reach = scene->radius[k], shrink = scene->radius[of] / reach;
-    const double link_x = (scene->center_x[k] - scene->center_x[of]) / reach;
-    const double link_y = (scene->center_y[k] - scene->center_y[of]) / reach;
-    const double link_z = (scene->center_z[k] - scene->center_z[of]) / reach;
-    for (int j = q->at; j < q->at + q->count; ++j) {
-        const int i = child->from[j];
-        /* mirrored ray and sphere [15 mul 11 add 1 sqrt 1 max]. Lagrange's identity |m|^2 |D|^2 - (m.D)^2 = |m x
-         * D|^2 */
-        const double m_x = link_x - p->p_x[i] * shrink;   /* m, the centre seen from the point, in radii */
-        const double m_y = link_y - p->p_y[i] * shrink;
-        const double m_z = link_z - p->p_z[i] * shrink;
-        const double cross_x = p->mirror_z[i] * m_y - p->mirror_y[i] * m_z;   /* m x d, with d the mirrored ray */
-        const double cross_y = p->mirror_x[i] * m_z - p->mirror_z[i] * m_x;
-        const double cross_z = p->mirror_y[i] * m_x - p->mirror_x[i] * m_y;
-        /* |d|^2 */
-        const double d2 = p->mirror_x[i] * p->mirror_x[i] + p->mirror_y[i] * p->mirror_y[i] + p->mirror_z[i]
-            * p->mirror_z[i];
-        /* disc / R^2: a hit where >= 0 and m.d > 0 */
-        const double disc = d2 - cross_x * cross_x - cross_y * cross_y - cross_z * cross_z;
-        const double facing = sqrt(disc > 0.0 ? disc : 0.0);   /* -n.d */
+    /* inputs in full [1 call] */
+    const double_double full_own_radius = dd_sum(scene->radius[of], scene->radius_low[of]);
 
-        /* normal [16 mul 9 add 1 div] */
-        const double inv_d2 = 1.0 / d2;
+    /* from sphere to sphere [11 call] */
+    /* the centre seen from the mirror's, in radii */
+    const double_double link_x = dd_div(dd_difference(scene->center_x[k], scene->center_x[of]),
+        dd_from(scene->radius[k]));
+    const double_double link_y = dd_div(dd_difference(scene->center_y[k], scene->center_y[of]),
+        dd_from(scene->radius[k]));
+    const double_double link_z = dd_div(dd_difference(scene->center_z[k], scene->center_z[of]),
+        dd_from(scene->radius[k]));
+    const double_double shrink = dd_div(full_own_radius, dd_from(scene->radius[k]));   /* the mirror's unit in radii */
+    for (int j = q->at; j < q->at + padded(q->count); ++j) {
+        const int i = child->from[j];
+        /* inputs in full [6 call] */
+        const double_double full_p_x = dd_sum(p->p_x[i], p->p_x_low[i]);   /* both words */
+        const double_double full_p_y = dd_sum(p->p_y[i], p->p_y_low[i]);
+        const double_double full_p_z = dd_sum(p->p_z[i], p->p_z_low[i]);
+        const double_double full_mirror_x = dd_sum(p->mirror_x[i], p->mirror_x_low[i]);
+        const double_double full_mirror_y = dd_sum(p->mirror_y[i], p->mirror_y_low[i]);
+        const double_double full_mirror_z = dd_sum(p->mirror_z[i], p->mirror_z_low[i]);
+
+        /* mirrored ray and sphere [28 call]. Lagrange's identity |m|^2 |D|^2 - (m.D)^2 = |m x D|^2 */
+        /* m, the centre seen from the point, in radii */
+        const double_double m_x = pair_sub(link_x, pair_mul(full_p_x, shrink));
+        const double_double m_y = pair_sub(link_y, pair_mul(full_p_y, shrink));
+        const double_double m_z = pair_sub(link_z, pair_mul(full_p_z, shrink));
+        /* m x d, with d the mirrored ray */
+        const double_double cross_x = pair_sub(pair_mul(full_mirror_z, m_y), pair_mul(full_mirror_y, m_z));
+        const double_double cross_y = pair_sub(pair_mul(full_mirror_x, m_z), pair_mul(full_mirror_z, m_x));
+        const double_double cross_z = pair_sub(pair_mul(full_mirror_y, m_x), pair_mul(full_mirror_x, m_y));
+        /* |d|^2 */
+        const double_double d2 = pair_add(pair_add(pair_square(full_mirror_x), pair_square(full_mirror_y)),
+            pair_square(full_mirror_z));
+        /* disc / R^2: a hit where >= 0 and m.d > 0 */
+        const double_double disc = pair_sub(pair_sub(pair_sub(d2, pair_square(cross_x)), pair_square(cross_y)),
+            pair_square(cross_z));
+        const double_double facing = pair_sqrt(pair_positive_part(disc));   /* -n.d */
+
+        /* normal [32 call] */
+        const double_double inv_d2 = pair_inverse(d2);
         /* the foot point -(d x (m x d)) / |d|^2 lies on the ray, nearest to the centre */
-        const double n_x = (p->mirror_z[i] * cross_y - p->mirror_y[i] * cross_z - p->mirror_x[i] * facing) * inv_d2;
-        const double n_y = (p->mirror_x[i] * cross_z - p->mirror_z[i] * cross_x - p->mirror_y[i] * facing) * inv_d2;
-        const double n_z = (p->mirror_y[i] * cross_x - p->mirror_x[i] * cross_y - p->mirror_z[i] * facing) * inv_d2;
-        const double bounce = 2.0 * facing;
-        const double next_x = p->mirror_x[i] + n_x * bounce;   /* d mirrored at the surface, d + 2 facing n */
-        const double next_y = p->mirror_y[i] + n_y * bounce;
-        const double next_z = p->mirror_z[i] + n_z * bounce;
+        const double_double loose_n_x = pair_mul(pair_sub(pair_sub(pair_mul(full_mirror_z, cross_y),
+            pair_mul(full_mirror_y, cross_z)), pair_mul(full_mirror_x, facing)), inv_d2);
+        const double_double n_x = pair_normalised(loose_n_x);
+        const double_double loose_n_y = pair_mul(pair_sub(pair_sub(pair_mul(full_mirror_x, cross_z),
+            pair_mul(full_mirror_z, cross_x)), pair_mul(full_mirror_y, facing)), inv_d2);
+        const double_double n_y = pair_normalised(loose_n_y);
+        const double_double loose_n_z = pair_mul(pair_sub(pair_sub(pair_mul(full_mirror_y, cross_x),
+            pair_mul(full_mirror_x, cross_y)), pair_mul(full_mirror_z, facing)), inv_d2);
+        const double_double n_z = pair_normalised(loose_n_z);
+        const double_double bounce = dd_scale(facing, 2.0);
+        /* d mirrored at the surface, d + 2 facing n */
+        const double_double loose_next_x = pair_add(full_mirror_x, pair_mul(n_x, bounce));
+        const double_double next_x = pair_normalised(loose_next_x);
+        const double_double loose_next_y = pair_add(full_mirror_y, pair_mul(n_y, bounce));
+        const double_double next_y = pair_normalised(loose_next_y);
+        const double_double loose_next_z = pair_add(full_mirror_z, pair_mul(n_z, bounce));
+        const double_double next_z = pair_normalised(loose_next_z);
 
         /* margin [14 mul 8 add 2 div 1 sqrt 1 max] */
-        const double d_size = sqrt(d2 > 0.0 ? d2 : 0.0);   /* |d| */
-        const double ahead = p->mirror_x[i] * m_x + p->mirror_y[i] * m_y + p->mirror_z[i] * m_z;   /* m.d */
+        const double d_size = sqrt(d2.hi > 0.0 ? d2.hi : 0.0);   /* |d| */
+        const double ahead = p->mirror_x[i] * m_x.hi + p->mirror_y[i] * m_y.hi + p->mirror_z[i] * m_z.hi;   /* m.d */
         /* the ray's way, in radii */
-        const double travelled = (m_x * m_x + m_y * m_y + m_z * m_z - 1.0) * d_size / (facing + ahead);
-        /* how far rounding moves the new point: more at grazing rays */
-        const double drifted = 1.0 + d_size * (0.25 * 3.0 * p->drift[i] * shrink + 0.5 * 3.0 * p->turn[i] * travelled)
-            / facing;
+        const double travelled = (m_x.hi * m_x.hi + m_y.hi * m_y.hi + m_z.hi * m_z.hi - 1.0) * d_size
+            / (facing.hi + ahead);
+        /* how far what two words leave moves the new point: more at grazing rays */
+        const double turned = 1.0 + d_size
+            * (0.25 * 3.0 * p->turn[i] * shrink.hi + 0.5 * 3.0 * p->turn[i] * travelled) / facing.hi;
 
-        child->n_x[j] = n_x;
-        child->n_y[j] = n_y;
-        child->n_z[j] = n_z;
-        child->mirror_x[j] = next_x;
-        child->mirror_y[j] = next_y;
-        child->mirror_z[j] = next_z;
-        child->p_x[j] = n_x;
-        child->p_y[j] = n_y;
-        child->p_z[j] = n_z;
-        child->inv_d2[j] = inv_d2;
-        child->blur[j] = child->drift[j] = child->turn[j] = drifted;
+        child->n_x[j] = n_x.hi;
+        child->n_y[j] = n_y.hi;
+        child->n_z[j] = n_z.hi;
+        child->mirror_x[j] = next_x.hi;
+        child->mirror_y[j] = next_y.hi;
+        child->mirror_z[j] = next_z.hi;
+        child->p_x[j] = n_x.hi;
+        child->p_y[j] = n_y.hi;
+        child->p_z[j] = n_z.hi;
+        child->inv_d2[j] = inv_d2.hi;
+        child->p_x_low[j] = n_x.lo;
+        child->p_y_low[j] = n_y.lo;
+        child->p_z_low[j] = n_z.lo;
+        child->mirror_x_low[j] = next_x.lo;
+        child->mirror_y_low[j] = next_y.lo;
+        child->mirror_z_low[j] = next_z.lo;
+        child->blur[j] = 1.0;
+        child->turn[j] = turned;
+        child->margin[j] = turned < MOST_TURN ? INFINITY : 0.0;
     }
 }
 
@@ -1019,12 +1162,12 @@ static void find_plane_in_mirror(points *p, const run *q, const frame *h)
         const double foot_y = o_y + p->mirror_y[i] * t_plane;
         const double foot_z = o_z + p->mirror_z[i] * t_plane;
 
-        /* margin [10 mul 5 add 1 div 4 call] */
+        /* margin [8 mul 5 add 1 div 4 call] */
         const double d_size = fabs(p->mirror_x[i]) + fabs(p->mirror_y[i]) + fabs(p->mirror_z[i]);   /* at least |d| */
         const double travelled = t_plane * d_size;   /* the ray's way, in heights */
-        const double margin = fabs(descent) - 5.684341886080802e-14 * p->turn[i] * d_size;   /* not above 0: in doubt */
-        /* how far rounding moves the ray aside */
-        const double drifted = 1.0 + 0.25 * 3.0 * p->drift[i] * scale + 0.5 * 3.0 * p->turn[i] * travelled;
+        const double margin = fabs(descent) - 5.684341886080802e-14 * d_size;   /* not above 0: in doubt */
+        /* rounding moves the ray aside */
+        const double drifted = 1.0 + 0.25 * 3.0 * p->blur[i] * scale + 0.5 * 3.0 * travelled;
         const double blurred = d_size * drifted / descent;   /* and so the foot, along the plane */
 
         const int is_nearer = (descent > 0.0) & (t < p->nearest[i]);
@@ -1039,52 +1182,89 @@ static void find_plane_in_mirror(points *p, const run *q, const frame *h)
 }
 
 /* Point and next mirrored ray where rays of the points above meet the plane. */
-static void arrive_on_plane(points *child, const run *q, const points *p, int of, const scene_type *scene)
+static void arrive_on_plane(
+    points *restrict child, const run *q, const points *restrict p, int of, const scene_type *scene)
 {
-    const double plane_x = scene->plane_x, plane_y = scene->plane_y, plane_z = scene->plane_z;
-    const double height = scene->radius[scene->spheres], scale = scene->radius[of] / height;
-    const double origin_x = (scene->center_x[of] - scene->center_x[scene->spheres]) / height;
-    const double origin_y = (scene->center_y[of] - scene->center_y[scene->spheres]) / height;
-    const double origin_z = (scene->center_z[of] - scene->center_z[scene->spheres]) / height;
-    for (int j = q->at; j < q->at + q->count; ++j) {
+    /* inputs in full [5 call] */
+    const double_double full_plane_x = dd_sum(scene->plane_x, scene->plane_x_low);   /* both words */
+    const double_double full_plane_y = dd_sum(scene->plane_y, scene->plane_y_low);
+    const double_double full_plane_z = dd_sum(scene->plane_z, scene->plane_z_low);
+    const double_double full_height = dd_sum(scene->radius[scene->spheres], scene->radius_low[scene->spheres]);
+    const double_double full_own_radius = dd_sum(scene->radius[of], scene->radius_low[of]);
+
+    /* from sphere to plane [7 call] */
+    /* the mirror's centre seen from the eye, in heights */
+    const double_double origin_x = dd_div(dd_from(scene->center_x[of]), full_height);
+    const double_double origin_y = dd_div(dd_from(scene->center_y[of]), full_height);
+    const double_double origin_z = dd_div(dd_difference(scene->center_z[of], scene->center_z[scene->spheres]),
+        full_height);
+    const double_double scale = dd_div(full_own_radius, full_height);   /* the mirror's unit in heights */
+    for (int j = q->at; j < q->at + padded(q->count); ++j) {
         const int i = child->from[j];
-        /* mirrored ray and plane [19 mul 16 add 2 div] */
-        const double o_x = origin_x + p->p_x[i] * scale;   /* the point seen from the eye */
-        const double o_y = origin_y + p->p_y[i] * scale;
-        const double o_z = origin_z + p->p_z[i] * scale;
+        /* inputs in full [6 call] */
+        const double_double full_p_x = dd_sum(p->p_x[i], p->p_x_low[i]);
+        const double_double full_p_y = dd_sum(p->p_y[i], p->p_y_low[i]);
+        const double_double full_p_z = dd_sum(p->p_z[i], p->p_z_low[i]);
+        const double_double full_mirror_x = dd_sum(p->mirror_x[i], p->mirror_x_low[i]);
+        const double_double full_mirror_y = dd_sum(p->mirror_y[i], p->mirror_y_low[i]);
+        const double_double full_mirror_z = dd_sum(p->mirror_z[i], p->mirror_z_low[i]);
+
+        /* mirrored ray and plane [3 mul 2 add 1 div 38 call] */
+        const double_double o_x = pair_add(origin_x, pair_mul(full_p_x, scale));   /* the point seen from the eye */
+        const double_double o_y = pair_add(origin_y, pair_mul(full_p_y, scale));
+        const double_double o_z = pair_add(origin_z, pair_mul(full_p_z, scale));
         /* -n.d: the ray meets the plane where it is positive */
-        const double descent = -(p->mirror_x[i] * plane_x) - (p->mirror_y[i] * plane_y + p->mirror_z[i] * plane_z);
+        const double_double descent = pair_sub(dd_neg(pair_mul(full_plane_x, full_mirror_x)),
+            pair_add(pair_mul(full_plane_y, full_mirror_y), pair_mul(full_plane_z, full_mirror_z)));
         /* height over descent */
-        const double t_plane = (1.0 + plane_x * o_x + plane_y * o_y + plane_z * o_z) / descent;
-        const double foot_x = o_x + p->mirror_x[i] * t_plane;   /* where it meets the plane, seen from the eye */
-        const double foot_y = o_y + p->mirror_y[i] * t_plane;
-        const double foot_z = o_z + p->mirror_z[i] * t_plane;
-        const double inv_d2 = 1.0 / (p->mirror_x[i] * p->mirror_x[i] + p->mirror_y[i] * p->mirror_y[i]
-            + p->mirror_z[i] * p->mirror_z[i]);
-        const double bounce = 2.0 * descent;
-        const double next_x = p->mirror_x[i] + plane_x * bounce;   /* d mirrored at the plane */
-        const double next_y = p->mirror_y[i] + plane_y * bounce;
-        const double next_z = p->mirror_z[i] + plane_z * bounce;
+        const double_double t_plane = pair_div(pair_add(pair_add(pair_add_double(pair_mul(full_plane_x, o_x), 1.0),
+            pair_mul(full_plane_y, o_y)), pair_mul(full_plane_z, o_z)), descent);
+        /* where it meets the plane, seen from the eye */
+        const double_double loose_foot_x = pair_add(o_x, pair_mul(full_mirror_x, t_plane));
+        const double_double foot_x = pair_normalised(loose_foot_x);
+        const double_double loose_foot_y = pair_add(o_y, pair_mul(full_mirror_y, t_plane));
+        const double_double foot_y = pair_normalised(loose_foot_y);
+        const double_double loose_foot_z = pair_add(o_z, pair_mul(full_mirror_z, t_plane));
+        const double_double foot_z = pair_normalised(loose_foot_z);
+        const double inv_d2 = 1.0 / (full_mirror_x.hi * full_mirror_x.hi + full_mirror_y.hi * full_mirror_y.hi
+            + full_mirror_z.hi * full_mirror_z.hi);
+        const double_double bounce = dd_scale(descent, 2.0);
+        /* d mirrored at the plane */
+        const double_double loose_next_x = pair_add(full_mirror_x, pair_mul(full_plane_x, bounce));
+        const double_double next_x = pair_normalised(loose_next_x);
+        const double_double loose_next_y = pair_add(full_mirror_y, pair_mul(full_plane_y, bounce));
+        const double_double next_y = pair_normalised(loose_next_y);
+        const double_double loose_next_z = pair_add(full_mirror_z, pair_mul(full_plane_z, bounce));
+        const double_double next_z = pair_normalised(loose_next_z);
 
-        /* margin [8 mul 4 add 1 div 3 call] */
+        /* margin [11 mul 7 add 1 div 1 sqrt 3 call] */
         const double d_size = fabs(p->mirror_x[i]) + fabs(p->mirror_y[i]) + fabs(p->mirror_z[i]);   /* at least |d| */
-        const double travelled = t_plane * d_size;   /* the ray's way, in heights */
-        /* how far rounding moves the ray aside */
-        const double drifted = 1.0 + 0.25 * 3.0 * p->drift[i] * scale + 0.5 * 3.0 * p->turn[i] * travelled;
-        const double blurred = d_size * drifted / descent;   /* and so the foot, along the plane */
+        const double travelled = t_plane.hi * d_size;   /* the ray's way, in heights */
+        /* rounding moves the point by its distance */
+        const double blurred = 1.0 + sqrt(foot_x.hi * foot_x.hi + foot_y.hi * foot_y.hi + foot_z.hi * foot_z.hi);
+        /* what two words leave moves the ray aside */
+        const double drifted = 1.0 + 0.25 * 3.0 * p->turn[i] * scale.hi + 0.5 * 3.0 * p->turn[i] * travelled;
+        const double turned = d_size * drifted / descent.hi;   /* and so the foot, along the plane */
 
-        child->p_x[j] = foot_x;
-        child->p_y[j] = foot_y;
-        child->p_z[j] = foot_z;
-        child->mirror_x[j] = next_x;
-        child->mirror_y[j] = next_y;
-        child->mirror_z[j] = next_z;
-        child->n_x[j] = plane_x;
-        child->n_y[j] = plane_y;
-        child->n_z[j] = plane_z;
+        child->mirror_x[j] = next_x.hi;
+        child->mirror_y[j] = next_y.hi;
+        child->mirror_z[j] = next_z.hi;
+        child->n_x[j] = full_plane_x.hi;
+        child->n_y[j] = full_plane_y.hi;
+        child->n_z[j] = full_plane_z.hi;
+        child->p_x[j] = foot_x.hi;
+        child->p_y[j] = foot_y.hi;
+        child->p_z[j] = foot_z.hi;
         child->inv_d2[j] = inv_d2;
+        child->p_x_low[j] = foot_x.lo;
+        child->p_y_low[j] = foot_y.lo;
+        child->p_z_low[j] = foot_z.lo;
+        child->mirror_x_low[j] = next_x.lo;
+        child->mirror_y_low[j] = next_y.lo;
+        child->mirror_z_low[j] = next_z.lo;
         child->blur[j] = blurred;
-        child->drift[j] = child->turn[j] = drifted;
+        child->turn[j] = turned;
+        child->margin[j] = turned < MOST_TURN ? INFINITY : 0.0;
     }
 }
 
@@ -1111,24 +1291,28 @@ static void follow(points *p, const run *q, int k, double weight, const frame *h
 {
     const scene_type *scene = h->scene;
     points *child = p + 1;
-    int i = q->at;
+    int i = q->at, waiting = 0;
     const int end = q->at + q->count;
-    while (i < end) {
+    for (int n = i; n < end; ++n)
+        waiting += p->seen[n] == k;
+    while (waiting > 0) {
         if (child->count == POINTS)
             flush_mirror(p, h, bounces);
         run *next = &child->run[child->runs];
+        const int at = child->count, room = waiting < POINTS - at ? waiting : POINTS - at;
         next->receiver = k;
-        next->at = child->count;
-        next->count = next->place = 0;
-        for (; i < end && next->at + next->count < POINTS; ++i)
-            if (p->seen[i] == k) {
-                child->from[next->at + next->count] = i;
-                child->weight[next->at + next->count] = weight;
-                child->margin[next->at + next->count] = INFINITY;
-                ++next->count;
-            }
-        if (next->count == 0)
-            break;
+        next->at = at;
+        next->count = room;
+        next->place = 0;
+        waiting -= room;
+        for (int found = 0; found < room; ++i) {
+            child->from[at + found] = i;
+            found += p->seen[i] == k;
+        }
+        for (int j = at + room; j < at + padded(room); ++j)
+            child->from[j] = child->from[at];   /* what lies between two runs is worked out and never read */
+        for (int j = at; j < at + room; ++j)
+            child->weight[j] = weight;
         child->count += padded(next->count);
         ++child->runs;
         if (k >= scene->spheres)
@@ -1418,8 +1602,8 @@ static int ground_at(double x, const plane_row *r, const frame *h, int first, do
     /* margin [4 mul 6 add 2 call] */
     /* not above 0: in doubt */
     const double margin = fabs(descent) + f->margin_frame + r->margin_row - 5.684341886080802e-14 * fabs(x);
-    const double share_2 = p_x * p_x + p_y * p_y + p_z * p_z;
-    const double blurred = 1.0 + share_2;   /* far away rounding moves the point along the ray by |p|^2 */
+    /* far away rounding moves the point along the ray by |p|^2 */
+    const double blurred = 1.0 + p_x * p_x + p_y * p_y + p_z * p_z;
 
     *sure = least(margin, *sure);
     return descent > 0.0 ? first + parity_of(p_x, p_y, p_z, blurred, sure, h) : -1;
@@ -1502,7 +1686,6 @@ static void surface(points *p, const workspace *w, const frame *h, int slot, int
     for (int i = r->at; i < p->count; ++i) {
         p->margin[i] = i < r->at + count ? sure[i - r->at] : INFINITY;
         p->blur[i] = 1.0;
-        p->drift[i] = p->turn[i] = 1.0;
     }
     if (receiver >= h->scene->spheres) {
         plane_surface(p, r->at, count, first, step, ground, &h->plane);
@@ -1679,5 +1862,46 @@ ptrdiff_t scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(
     if (p->count > 0)
         found += flush(p, h, out, NULL, (size_t)((out - values) / CHANNELS), unsettled ? unsettled + found : NULL);
     drop(&w);
+    return found;
+}
+
+int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_prepare_many(
+    frame **frames, const scene_type *scenes, ptrdiff_t count, const symrender_grid *grids)
+{
+    for (ptrdiff_t k = 0; k < count; ++k) {
+        frames[k] = scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_prepare(&scenes[k], &grids[k]);
+        if (!frames[k]) {
+            scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_release_many(frames, k);
+            return -1;
+        }
+    }
+    return 0;
+}
+
+void scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_release_many(
+    frame **frames, ptrdiff_t count)
+{
+    for (ptrdiff_t k = 0; k < count; ++k)
+        scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_release(frames[k]);
+}
+
+ptrdiff_t scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_batch(double *const *images, ptrdiff_t stride,
+    frame *const *frames, ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled)
+{
+    const ptrdiff_t height = frames[0]->grid.height, pixels = height * frames[0]->grid.width;
+    ptrdiff_t found = 0;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : (int)height;
+        const ptrdiff_t listed = scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(
+            images[k], stride, frames[k], NULL, begin, end, unsettled ? unsettled + found : NULL);
+        if (listed < 0)
+            return -1;
+        for (ptrdiff_t i = 0; unsettled && i < listed; ++i)
+            unsettled[found + i] += k * pixels;
+        found += listed;
+    }
     return found;
 }

@@ -22,6 +22,7 @@ typedef struct {
     int receivers;                                   /* spheres, then the plane's materials: what may be lit */
     const double *center_x, *center_y, *center_z;    /* [receivers] centre of a sphere; for the plane the eye */
     const double *radius;                            /* [receivers] radius; for the plane the eye's height above it */
+    const double *radius_low;                        /* [receivers] what rounding left of that height; else 0 */
     const int *crosses_plane;                        /* [spheres] the sphere may lie on both sides of the plane */
     const double *ambient;                           /* [receivers][3] ambient coefficient */
     const double *diffuse;                           /* [receivers][3] diffuse coefficient */
@@ -40,6 +41,7 @@ typedef struct {
     const int *mirror_plane;                         /* [receivers] the plane may be seen in it */
     int plane_seen;                                  /* the eye may see the plane, not only mirrors */
     double plane_x, plane_y, plane_z;                /* unit normal of the plane, on the eye's side */
+    double plane_x_low, plane_y_low, plane_z_low;    /* and what rounding left of it */
     double across_x, across_y, across_z, across_0;   /* a tile's number across: floor(across.p + across_0) */
     double along_x, along_y, along_z, along_0;       /* and along */
     const double *background;                        /* [3] intensity where no ray hits, straight down */
@@ -81,6 +83,19 @@ ptrdiff_t scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_rows(double *image
  * rows, by the numbers of points. */
 ptrdiff_t scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_points(double *values, const double *x, const double *y,
     ptrdiff_t count, const scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_frame *frame, ptrdiff_t *unsettled);
+
+/* Many scenes of one structure, each with its grid: all their frames, or -1 and none where there is no memory. */
+int scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_prepare_many(scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_frame **frames,
+    const scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_scene *scenes, ptrdiff_t count, const symrender_grid *grids);
+void scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_release_many(
+    scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_frame **frames, ptrdiff_t count);
+
+/* Writes rows [row_begin, row_end) of many images of one size, counted through: row j of image k is row k * height + j
+ * and starts at images[k] + j * stride. `unsettled`, and what is returned, as for rows, with the pixels counted
+ * through: (k * height + row) * width + column. */
+ptrdiff_t scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_batch(double *const *images, ptrdiff_t stride,
+    scene_tiles_sunk_gated_shadow_mirror_sky_rgb_double_frame *const *frames, ptrdiff_t row_begin, ptrdiff_t row_end,
+    ptrdiff_t *unsettled);
 
 #ifdef __cplusplus
 }

@@ -72,6 +72,27 @@ SYMRENDER_INLINE float fast_power_of_lobef(float log2_cos2, float exponent)
     return fast_exp2f(log2_power < 0.0f ? log2_power : 0.0f);   /* a sin2 below 0 by rounding is 0 */
 }
 
+/* n / 2 for n from 32 on, else 0 */
+static inline float half_of_large(float n)
+{
+    return n >= 32.0f ? 0.5f * (n < 0x1p100f ? n : 0x1p100f) : 0.0f;
+}
+
+/* cos2^h for a block of points and h of at least 16: 2^(h log2(1 - g)), g = 1 - cos2, with log2(1 - g) = -g s(g), s of
+ * degree 3. It is good where g <= 7/16; beyond, the power is below 1.1e-4 and comes out so. `y` is room for as many.
+ * Error: at most 0.000112, of y relative 0.000162. */
+SYMRENDER_INLINE void fast_powers_of_lobef(
+    const float *restrict cos2, float *restrict y, float *restrict power, float h, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        const float g = cos2[i] < 1.0f ? 1.0f - cos2[i] : 0.0f, g2 = g * g;
+        const float s = (1.44247496f + 0.736635625f * g) + (0.321448207f + 0.844810069f * g) * g2;
+        y[i] = -(h * g) * s;
+    }
+    for (int i = 0; i < count; ++i)
+        power[i] = fast_exp2f(y[i]);
+}
+
 /* (cos a)^exponent from both squares, as cos2^(exponent / 2) */
 SYMRENDER_INLINE float fast_power_of_cosinef(float cos2, float sin2, float exponent)
 {

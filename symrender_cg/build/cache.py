@@ -14,31 +14,25 @@ written is replaced, for the life of the process and with one CacheWarning, by a
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import sys
 import threading
-import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from symrender_cg.build import library
-from symrender_cg.build.compile import compile_library, kernel_flags, project_flags
+from symrender_cg.build.entries import FORMAT, BuildJob, build_under, identity_of, machine_identity, recipe_name
+from symrender_cg.build.files import children, discard, remove_at_exit, size_of, unused_name, write_whole
 from symrender_cg.build.library import CachedKernel, Library, read_kernel
-from symrender_cg.build.portable import binding_text, fingerprint
-from symrender_cg.build.toolchain import RecordStore, Toolchain, cpu_identity, find_toolchain
+from symrender_cg.build.toolchain import RecordStore, Toolchain, find_toolchain
 from symrender_cg.errors import ArgumentError, CompileError, CompilerNotFoundError, LibraryError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
-
-FORMAT = 2
-ABANDONED_SECONDS = 3600.0  # a build that is still under a dotted name after an hour was killed
-PUBLISH_ATTEMPTS = 8
 
 # Keyed by process id: a child of fork must not wait for a lock that a thread of its parent held.
 _build_locks: dict[tuple[int, str], threading.Lock] = {}
@@ -106,7 +100,7 @@ class Cache:
         if reserved:
             raise ArgumentError(f"sources[{reserved[0]!r}]: the cache writes a file of that name; choose another one")
         chosen = self.toolchain() if toolchain is None else toolchain
-        job = _Job(dict(sources), cdef, chosen, portable, tuple(extra_flags))
+        job = BuildJob(dict(sources), cdef, chosen, portable, tuple(extra_flags))
         key = job.key()
         found = self._find(key)
         if found is not None:
@@ -139,13 +133,13 @@ class Cache:
         Where no compiler is installed any longer, what was built for this processor is still found.
         """
         try:
-            identity = _identity(toolchain or self.toolchain(), portable, extra_flags)
+            identity = identity_of(toolchain or self.toolchain(), portable, extra_flags)
         except CompilerNotFoundError:
             if os.environ.get("CC", "").strip():
                 return None  # a CC that does not work is for kernel() to report, never to be passed over
-            identity = _machine_identity(portable, extra_flags)
+            identity = machine_identity(portable, extra_flags)
         for place in self._places():
-            entry = _read_recipe(place / "recipes" / _recipe_name(recipe, identity))
+            entry = _read_recipe(place / "recipes" / recipe_name(recipe, identity))
             kernel = None if entry is None else read_kernel(place / "kernels" / entry[0])
             if entry is not None and kernel is not None:
                 return kernel, entry[1]
@@ -161,23 +155,23 @@ class Cache:
         try:
             recipes.mkdir(parents=True, exist_ok=True)
             for identity in (kernel.manifest.identity, kernel.manifest.machine):
-                _write_whole(recipes / _recipe_name(recipe, identity), text)
+                write_whole(recipes / recipe_name(recipe, identity), text)
         except OSError as problem:
             self._substitute(problem)
 
     def size(self) -> CacheSize:
         """Kernels, recipes and bytes under the root; zeros where there is no such folder."""
-        kernels = sum(1 for path in _children(self.root / "kernels") if not path.name.startswith("."))
-        recipes = sum(1 for path in _children(self.root / "recipes") if path.suffix == ".json")
+        kernels = sum(1 for path in children(self.root / "kernels") if not path.name.startswith("."))
+        recipes = sum(1 for path in children(self.root / "recipes") if path.suffix == ".json")
         files = (path for part in ("kernels", "recipes", "toolchains") for path in (self.root / part).rglob("*"))
-        return CacheSize(kernels, recipes, sum(_bytes(path) for path in files))
+        return CacheSize(kernels, recipes, sum(size_of(path) for path in files))
 
     def clear(self) -> CacheSize:
         """Remove every entry, nothing else under the root, and return what there was. Loaded libraries stay usable."""
         before = self.size()
         for part in ("recipes", "kernels", "toolchains", "cost"):
-            for path in _children(self.root / part):
-                _discard(path)
+            for path in children(self.root / part):
+                discard(path)
         self._records.forget()
         return before
 
@@ -186,7 +180,7 @@ class Cache:
         kernels = self.root / "kernels"
         try:
             kernels.mkdir(parents=True, exist_ok=True)
-            probe = kernels / _unused_name("probe")
+            probe = kernels / unused_name("probe")
             probe.write_bytes(b"probe")
             probe.unlink()
         except OSError as problem:
@@ -203,16 +197,16 @@ class Cache:
         kernels = (read_kernel(place / "kernels" / key, thorough=thorough) for place in self._places())
         return next((kernel for kernel in kernels if kernel is not None), None)
 
-    def _build(self, job: _Job, key: str) -> CachedKernel:
+    def _build(self, job: BuildJob, key: str) -> CachedKernel:
         try:
-            return _build_under(self.root, job, key)
+            return build_under(self.root, job, key)
         except OSError as problem:
             reason: Exception = problem
         except CompileError as problem:
             if "No space left on device" not in problem.stderr:
                 raise
             reason = OSError("the compiler found no space left on the device")
-        return _build_under(self._substitute(reason), job, key)
+        return build_under(self._substitute(reason), job, key)
 
     def _rebuild(self, kernel: CachedKernel) -> CachedKernel:
         manifest = kernel.manifest
@@ -222,9 +216,9 @@ class Cache:
             cdef = (kernel.folder / library.CDEF_NAME).read_bytes().decode()
         except (OSError, UnicodeDecodeError):
             toolchain = None
-        _discard(kernel.folder)
+        discard(kernel.folder)
         if toolchain is not None:
-            job = _Job(texts, cdef, toolchain, manifest.portable, manifest.extra_flags)
+            job = BuildJob(texts, cdef, toolchain, manifest.portable, manifest.extra_flags)
             if job.key() == manifest.key:
                 with _build_locks.setdefault((os.getpid(), manifest.key), threading.Lock()):
                     return self._find(manifest.key, thorough=True) or self._build(job, manifest.key)
@@ -240,7 +234,7 @@ class Cache:
         import tempfile
 
         made = Path(tempfile.mkdtemp(prefix="symrender_cg-"))
-        atexit.register(_remove_at_exit, made, os.getpid())
+        atexit.register(remove_at_exit, made, os.getpid())
         chosen = _substitutes.setdefault(name, made)
         if chosen is made:
             warnings.warn(
@@ -269,47 +263,12 @@ class _DiskRecords(RecordStore):
         self._memory[name] = text
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            _write_whole(self._folder / f"{name}.json", text)
+            write_whole(self._folder / f"{name}.json", text)
         except OSError:
             return  # kernel() meets the same obstacle and warns
 
     def forget(self) -> None:
         self._memory.clear()
-
-
-@dataclass(frozen=True, slots=True)
-class _Job:
-    sources: dict[str, str]
-    cdef: str
-    toolchain: Toolchain
-    portable: bool
-    extra_flags: tuple[str, ...]
-
-    def key(self) -> str:
-        """sha256 of all that decides the bytes of the library and of its binding."""
-        identity = _identity(self.toolchain, self.portable, self.extra_flags)
-        return _digest([FORMAT, sorted(self.sources.items()), self.cdef, identity])
-
-
-def _identity(toolchain: Toolchain, portable: bool, extra_flags: Sequence[str]) -> str:
-    target = toolchain.target(portable)
-    flags = kernel_flags(toolchain, portable, extra_flags)
-    compiler = [toolchain.path, toolchain.kind, toolchain.version, toolchain.command]
-    builds = fingerprint(toolchain) if portable else ""
-    return _digest([compiler, target.cpu, target.fingerprint, flags, builds, library.cffi_version()])
-
-
-def _machine_identity(portable: bool, extra_flags: Sequence[str]) -> str:
-    flags = [*project_flags(), *extra_flags]
-    return _digest(["any compiler", cpu_identity(), portable, flags, library.cffi_version()])
-
-
-def _digest(parts: list[Any]) -> str:
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-def _recipe_name(recipe: str, identity: str) -> str:
-    return f"{_digest([FORMAT, recipe, identity])}.json"
 
 
 def _read_recipe(path: Path) -> tuple[str, Any] | None:
@@ -318,125 +277,3 @@ def _read_recipe(path: Path) -> tuple[str, Any] | None:
         return str(entry["kernel"]), entry["payload"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-def _build_under(root: Path, job: _Job, key: str) -> CachedKernel:
-    """Build in a dotted folder beside the target, then publish. Whatever happens, the dotted folder is gone after."""
-    kernels = root / "kernels"
-    kernels.mkdir(parents=True, exist_ok=True)
-    _remove_abandoned(kernels)
-    folder = kernels / _unused_name("building")
-    folder.mkdir()
-    try:
-        record = compile_library(
-            job.sources,
-            folder / library.LIBRARY_NAME,
-            toolchain=job.toolchain,
-            portable=job.portable,
-            extra_flags=job.extra_flags,
-            declarations=job.cdef,
-        )
-        library.write_binding(binding_text(job.cdef, job.toolchain, portable=job.portable), folder)
-        (folder / library.CDEF_NAME).write_bytes(job.cdef.encode())
-        manifest = library.write_manifest(
-            folder,
-            key=key,
-            identity=_identity(job.toolchain, job.portable, job.extra_flags),
-            machine=_machine_identity(job.portable, job.extra_flags),
-            toolchain=job.toolchain.to_json(),
-            portable=job.portable,
-            extra_flags=job.extra_flags,
-            sources=tuple(sorted(job.sources)),
-            command=record.command,
-            seconds=record.seconds,
-        )
-        target = kernels / key
-        built = CachedKernel(target, target / library.LIBRARY_NAME, manifest, False, record.seconds)
-        return _publish(folder, built)
-    finally:
-        _remove(folder)
-
-
-def _publish(folder: Path, built: CachedKernel) -> CachedKernel:
-    """Rename to the final name. A whole entry that is there already wins; a damaged one is moved out of the way."""
-    for _ in range(PUBLISH_ATTEMPTS):
-        try:
-            os.rename(folder, built.folder)
-            return built
-        except OSError:
-            if not os.path.lexists(built.folder):
-                raise
-        present = read_kernel(built.folder, thorough=True)
-        if present is not None:
-            return replace(present, compile_seconds=built.compile_seconds)
-        _discard(built.folder)
-    raise OSError(f"{built.folder} cannot be replaced")
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write a file that others see whole or not at all."""
-    unfinished = path.parent / _unused_name(path.stem[:16])
-    try:
-        unfinished.write_text(text, encoding="utf-8")
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
-
-
-def _unused_name(purpose: str) -> str:
-    return f".{purpose}-{os.getpid()}-{os.urandom(6).hex()}"
-
-
-def _discard(path: Path) -> None:
-    """Make an entry disappear at once for every reader, then remove it."""
-    aside = path.parent / _unused_name("removed")
-    try:
-        os.rename(path, aside)
-    except OSError:
-        return  # another process was faster, or the place is read-only
-    _remove(aside)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        import shutil
-
-        shutil.rmtree(path, ignore_errors=True)
-        return
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return
-
-
-def _remove_abandoned(folder: Path) -> None:
-    oldest = time.time() - ABANDONED_SECONDS
-    for path in _children(folder):
-        if path.name.startswith(".") and _modified(path) < oldest:
-            _remove(path)
-
-
-def _remove_at_exit(folder: Path, owner: int) -> None:
-    if os.getpid() == owner:
-        _remove(folder)
-
-
-def _children(folder: Path) -> list[Path]:
-    try:
-        return sorted(folder.iterdir())
-    except OSError:
-        return []
-
-
-def _bytes(path: Path) -> int:
-    try:
-        return path.stat().st_size if path.is_file() else 0
-    except OSError:
-        return 0
-
-
-def _modified(path: Path) -> float:
-    try:
-        return path.lstat().st_mtime
-    except OSError:
-        return float("inf")

@@ -3,7 +3,7 @@
 In:  sources by file name, a Goal for gcc. Out: one Counted a loop that became vector code.
 Never here: a machine that runs it, or a time. A count is the same on a busy machine as on an idle one.
 
-A loop of the assembly is what stands between a label and the last jump back to it, with no such loop inside. Line marks
+A loop of the assembly is what stands between a label and the last jump back to it with no such loop inside. Line marks
 (.loc, from -g1, which changes no instruction) say which loop of the C it came from: one whose lines it has, else one
 that calls the function whose lines it has, in the function of the assembly if it can be.
 """
@@ -89,7 +89,7 @@ def _inner_loops(assembly: str, file: str) -> list[tuple[str, list[int], list[st
     rows: list[tuple[int | None, str]] = []  # (line of the file where it is one, instruction or "")
     labels: dict[str, int] = {}
     functions: list[tuple[int, str]] = [(0, "")]
-    ends: dict[int, int] = {}
+    ends: dict[int, list[int]] = {}
     for text in assembly.splitlines():
         label = re.match(r"(\.L\w+):", text)
         mark = re.match(r"\s+\.loc (\d+) (\d+)", text)
@@ -104,13 +104,13 @@ def _inner_loops(assembly: str, file: str) -> list[tuple[str, list[int], list[st
             words = " ".join(text.split())
             jump = re.match(r"j\w+ (\.L\w+)$", words)
             if jump is not None and jump[1] in labels:
-                ends[labels[jump[1]]] = len(rows)
+                ends.setdefault(labels[jump[1]], []).append(len(rows))
             rows.append((None, words))
-    inner = [
-        (begin, end)
-        for begin, end in ends.items()
-        if not any(begin <= other <= ends[other] <= end for other in ends if other != begin)
-    ]
+    inner = []
+    for begin, jumps in ends.items():
+        # a jump back from code that was put aside, behind other loops, is not this loop's end
+        alone = [end for end in jumps if not any(begin < other <= min(ends[other]) <= end for other in ends)]
+        inner += [(begin, max(alone))] if alone else []
     found = []
     for begin, end in sorted(inner):
         inside = rows[begin : end + 1]
@@ -131,11 +131,30 @@ def _owner(text: list[str], loops: Sequence[Loop], function: str, lines: Sequenc
             loop for loop in loops if not loop.holds_loops and call.search("\n".join(text[loop.line : loop.last]))
         ]
         # inlined twice into two functions: the loop of this one, else one of a function that was itself inlined here
-        near = [loop for loop in calling if loop.function == function]
-        inlined = [loop for loop in calling if loop.function != function]
-        if near or inlined:
-            return (near or inlined)[0]
+        inlined = _called_by(text, function)
+        order = sorted(calling, key=lambda loop: (loop.function != function, loop.function not in inlined))
+        if order:
+            return order[0]
     return None
+
+
+def _called_by(text: list[str], function: str) -> set[str]:
+    """The functions of the file that one calls, and those that they call."""
+    bodies: dict[str, list[str]] = {}
+    current = ""
+    for number, line in enumerate(text, 1):
+        if line and line[0].isalpha():
+            current = function_at(text, number)
+        else:
+            bodies.setdefault(current, []).append(line)
+    found: set[str] = set()
+    waiting = [function]
+    while waiting:
+        words = set(re.findall(r"(\w+)\(", "\n".join(bodies.get(waiting.pop(), []))))
+        new = (words & bodies.keys()) - found
+        found |= new
+        waiting += new
+    return found
 
 
 def _innermost(loops: Sequence[Loop], line: int) -> Loop | None:

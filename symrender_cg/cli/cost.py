@@ -15,9 +15,11 @@ from symrender_cg.cli.console import Column, Table, counted, duration
 from symrender_cg.cli.progress import Progress
 from symrender_cg.cli.requests import choice_data, show_choice
 from symrender_cg.cost import store
-from symrender_cg.cost.choose import Choice, choose, recipe
+from symrender_cg.cost.choose import Choice, choose
 from symrender_cg.cost.front import BESIDE
+from symrender_cg.cost.looking import learn
 from symrender_cg.cost.measure import QUICK_ROUNDS, ROUNDS, Measured, measure
+from symrender_cg.cost.records import recipe
 from symrender_cg.cost.report import FORMAT, Effect, Entry, Report
 from symrender_cg.cost.search import BUDGET
 from symrender_cg.errors import ArgumentError
@@ -74,6 +76,8 @@ def _chosen(arguments: argparse.Namespace, scene: Scene) -> Choice:
         max_ulp=arguments.max_ulp,
         bits=arguments.bits,
         proved=arguments.proved,
+        bake=arguments.bake,
+        aspect=arguments.size[0] / arguments.size[1],
     )
 
 
@@ -112,6 +116,7 @@ def _report(arguments: argparse.Namespace, scene: Scene) -> tuple[Report, Measur
             measured = measure(scene, name, size, rounds=rounds, seed=arguments.seed, quick=arguments.quick, told=told)
         report = measured.report
         store.write("report", key, msgspec.json.encode(report))
+        learn(scene, report, measured.top)
     if arguments.effects and not report.effects:
         from symrender_cg.cost.effects import measure_effects
 
@@ -119,7 +124,7 @@ def _report(arguments: argparse.Namespace, scene: Scene) -> tuple[Report, Measur
         report = msgspec.structs.replace(report, effects=effects)
         store.write("report", key, msgspec.json.encode(report))
         if measured is not None:
-            measured = Measured(report, measured.ready)
+            measured = Measured(report, measured.ready, measured.top)
     return report, measured
 
 

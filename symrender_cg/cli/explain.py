@@ -67,8 +67,10 @@ def _choice(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
     from symrender_cg.cost.choose import choose
 
     name, value = arguments.meets
-    found = choose(scene, **{name: value})
+    width, height = arguments.size
+    found = choose(scene, aspect=width / height, **{name: value})
     arguments.accuracy, arguments.target = found.accuracy, found.target
+    arguments.max_error = max(arguments.max_error, found.tolerance)
     return found
 
 

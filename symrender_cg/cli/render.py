@@ -42,7 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
         )
     target = Path(arguments.output)
     if arguments.max_error is not None or arguments.max_ulp is not None:
-        choose_for(arguments, load_scene(arguments.scene), names=("max_error", "max_ulp"))
+        found = choose_for(arguments, load_scene(arguments.scene), names=("max_error", "max_ulp"), plans=True)
+        arguments.tolerance = 0.0 if found is None else found.tolerance
     chosen = variant(arguments.accuracy, arguments.target)
     grey_levels = chosen.result == "uint8"
     form = image_format(target, bits=arguments.bits, encoding=arguments.encoding, levels=grey_levels)
@@ -93,6 +94,7 @@ def _image_alone(arguments: argparse.Namespace, scene: Scene, target: Path) -> N
             clip=not arguments.no_clip,
             portable=arguments.portable,
             threads=arguments.threads,
+            aspect=width / height,
         )
     if job is not None:
         _proved(arguments, job, target)
@@ -109,6 +111,7 @@ def _image_alone(arguments: argparse.Namespace, scene: Scene, target: Path) -> N
             portable=arguments.portable,
             backend=arguments.backend,
             rows_done=progress.done,
+            tolerance=getattr(arguments, "tolerance", 0.0),
         )
         seconds = time.perf_counter() - begin
         progress.now(f"writing {target.name}")
@@ -183,8 +186,11 @@ def render_in_blocks(
     portable: bool,
     backend: str,
     rows_done: Callable[[int], None],
+    tolerance: float = 0.0,
 ) -> tuple[NDArray[Any], str]:
     """The image of render_image, bit for bit, made block by block of rows, and where its kernel came from, in words.
+
+    tolerance   how much any pixel may change by what the plan leaves out
 
     `rows_done` is called with the number of rows of each block that is finished.
     """
@@ -192,7 +198,7 @@ def render_in_blocks(
     if backend == "numpy":
         return _by_numpy(scene.in_camera_frame(), width, height, rows, accuracy, clip, rows_done), "numpy"
     compiled, derived = statistics.compiled, statistics.derived
-    drawing = draw(scene, accuracy, size=(width, height), clip=clip, portable=portable)
+    drawing = draw(scene, accuracy, size=(width, height), clip=clip, portable=portable, max_error=tolerance)
     origin = _origin(compiled, derived)
     image = np.empty(drawing.shape(height, width), drawing.dtype)
     for first in range(0, height, rows):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from symrender_cg.cli.console import Column, Table
+from symrender_cg.cli.console import Column, Table, counted
 from symrender_cg.errors import ArgumentError
 from symrender_cg.scene import Scene
 
@@ -21,9 +21,15 @@ REQUESTS = ("max_error", "max_ulp", "bits")
 
 
 def choose_for(
-    arguments: argparse.Namespace, scene: Scene, *, flags: bool = True, names: tuple[str, ...] = REQUESTS
+    arguments: argparse.Namespace,
+    scene: Scene,
+    *,
+    flags: bool = True,
+    plans: bool = False,
+    names: tuple[str, ...] = REQUESTS,
 ) -> Choice | None:
-    """What a request chose, None where there is no request. `flags`: variants with compiler flags of their own, too.
+    """What a request chose, None where there is no request. `flags`: variants with compiler flags of their own, too;
+    `plans`: those by plans that leave out what is within the tolerance.
 
     `names` of the options that are requests: to `render` --bits is another thing.
 
@@ -38,7 +44,8 @@ def choose_for(
         raise ArgumentError(f"{option}: chooses a kernel, and so does a request for an error; leave one of them out")
     from symrender_cg.cost.choose import choose
 
-    found = choose(scene, **given, flags=flags)
+    width, height = getattr(arguments, "size", (1, 1))
+    found = choose(scene, **given, flags=flags, plans=plans, aspect=width / height)
     print(found)
     several = isinstance(arguments.accuracy, tuple) or arguments.accuracy == "all"
     arguments.accuracy = (found.accuracy,) if several else found.accuracy
@@ -48,7 +55,8 @@ def choose_for(
 
 def show_choice(found: Choice) -> None:
     """The choice, and everything that was considered."""
-    print(f"{found}\n")
+    looked = f"looked at {counted(len(found.considered), 'way')} of {found.possible}"
+    print(f"{found}\n{looked}: those that may be fastest, until none was left that may be faster\n")
     table = Table(
         (
             Column("variant"),

@@ -9,7 +9,9 @@
     report.py      the results as data; store.py keeps them by scene and machine
     break_even.py  what a specialisation costs to build, saves a pixel, and after how many pixels it pays
     effects.py     the time of a scene with one effect after the other
-    choose.py      the fastest way whose bound meets what is asked for
+    choose.py      the fastest way whose bound meets what is asked for; asked.py: for render_image and evaluate
+    walk.py        which ways a request looks at, and when it stops; expected.py: in which order
+    looking.py     what it measures; records.py: what is kept of that, and of what `cost` measured
     chart.py, html.py   pictures of a report
 
 Comes in: a Scene. Goes out: a Report, or a Choice. Never done here: a kernel; the pipeline makes them.

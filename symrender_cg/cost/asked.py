@@ -1,6 +1,7 @@
-"""What render_image and evaluate do with max_error, max_ulp and bits: the accuracy and target that meet them.
+"""What render_image and evaluate do with max_error, max_ulp and bits: the kernel that meets them.
 
-Comes in: the arguments of such a call. Goes out: (accuracy, target). Never done here: a choice; choose.py makes it.
+Comes in: the arguments of such a call. Goes out: (accuracy, target, bake, tolerance of the plan). Never done here: a
+choice; choose.py makes it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from symrender_cg.cost.choose import choose
 from symrender_cg.errors import ArgumentError
 from symrender_cg.scene import Scene, load_scene
 
+Drawn = tuple[str, str | None, bool, float]
+
 
 def meeting(
     scene: Scene | str | Path | None,
@@ -24,16 +27,20 @@ def meeting(
     max_ulp: float | None,
     bits: float | None,
     given: dict[str, Any],
+    bake: bool = False,
+    aspect: float = 1.0,
     out: NDArray[Any] | None = None,
     points: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     cache: str | Path | None = None,
-) -> tuple[str, str | None]:
-    """The accuracy and target of the fastest variant that meets the request; see symrender_cg.cost.choose.
+) -> Drawn:
+    """Accuracy, target, bake and tolerance of the fastest variant that meets the request; see symrender_cg.cost.choose.
 
     given    other arguments of the call by name, and what they are if left out: ArgumentError where they differ, as
              they choose a kernel too
+    points   where values are asked for, in place of an image: there the whole plan draws
     """
-    key = (id(scene), max_error, max_ulp, bits, str(cache), None if out is None else str(getattr(out, "dtype", "")))
+    form = None if out is None else str(getattr(out, "dtype", ""))
+    key = (id(scene), max_error, max_ulp, bits, bake, aspect, str(cache), form)
     keeps = points is None and (scene is None or type(scene) is Scene)
     kept = _kept.get(key) if keeps else None
     if kept is not None and all(value == usual for value, usual in given.values()):
@@ -46,16 +53,28 @@ def meeting(
     chosen = load_scene(scene)
     dtype = None if not isinstance(out, np.ndarray) else out.dtype
     reach = 1.0 if points is None else reach_of(chosen, *points)
-    found = choose(chosen, max_error=max_error, max_ulp=max_ulp, bits=bits, dtype=dtype, reach=reach, cache=cache)
+    found = choose(
+        chosen,
+        max_error=max_error,
+        max_ulp=max_ulp,
+        bits=bits,
+        dtype=dtype,
+        reach=reach,
+        aspect=aspect,
+        plans=points is None,
+        bake=bake,
+        cache=cache,
+    )
+    drawn = found.accuracy, found.target, found.bake, found.tolerance
     if keeps:
         while len(_kept) >= MOST_KEPT:
             _kept.pop(next(iter(_kept)), None)
-        _kept[key] = chosen, (found.accuracy, found.target)
-    return found.accuracy, found.target
+        _kept[key] = chosen, drawn
+    return drawn
 
 
 MOST_KEPT = 16
-_kept: dict[tuple[object, ...], tuple[Scene, tuple[str, str | None]]] = {}
+_kept: dict[tuple[object, ...], tuple[Scene, Drawn]] = {}
 """What scenes were drawn with, each kept so that its identity is no other's."""
 
 

@@ -24,12 +24,9 @@ _ROUNDED_UP: Final = 1.0 + 2.0**-40
 
 def brightest(scene: Scene) -> float:
     """An upper bound of the intensity of any point, the largest channel; inf where attenuation leaves none."""
-    strength = 0.0
-    for light in scene.lights:
-        constant = light.attenuation[0] if isinstance(light, PointLight) else 1.0
-        if constant == 0.0:
-            return math.inf
-        strength += _largest(light.intensity) / constant
+    strength = _lights(scene)
+    if math.isinf(strength):
+        return math.inf
     behind = _background(scene)
     local, mirrored = 0.0, 0.0
     for material in _materials(scene):
@@ -39,6 +36,22 @@ def brightest(scene: Scene) -> float:
     for _ in range(scene.max_bounces if mirrored > 0.0 else 0):
         value = max(behind, local + mirrored * value)
     return value * _ROUNDED_UP
+
+
+def strength_of_highlights(scene: Scene) -> float:
+    """The intensity that the highlights of a point may have, the largest channel; mirrored ones left out."""
+    return min(_lights(scene), 1e30) * max((_largest(one.specular) for one in _materials(scene)), default=0.0)
+
+
+def _lights(scene: Scene) -> float:
+    """The sum of the lights' intensities, each over its constant attenuation; inf where that is 0."""
+    strength = 0.0
+    for light in scene.lights:
+        constant = light.attenuation[0] if isinstance(light, PointLight) else 1.0
+        if constant == 0.0:
+            return math.inf
+        strength += _largest(light.intensity) / constant
+    return strength
 
 
 def proved_bounds(scene: Scene, variant: Variant) -> tuple[float, float] | None:

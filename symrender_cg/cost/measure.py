@@ -38,10 +38,11 @@ Told = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A report, and the ways that it is about, in the order of its entries."""
+    """A report, and the ways that it is about, in the order of its entries; top: the brightest value of its points."""
 
     report: Report
     ready: tuple[Ready, ...]
+    top: float
 
 
 def measure(
@@ -82,7 +83,7 @@ def measure(
         budget=budget,
         seconds=time.perf_counter() - begin,
     )
-    return Measured(report, found.ready)
+    return Measured(report, found.ready, float(np.abs(sample.truth.value).max(initial=0.0)))
 
 
 def entries_of(
@@ -92,7 +93,7 @@ def entries_of(
     pixels = size[0] * size[1]
     samples = np.asarray(times) * (1e9 / pixels)
     base = samples[next(number for number, one in enumerate(ready) if one.way.name == DEFAULT)]
-    unit = float(np.median(base))
+    unit = float(np.nanmedian(base))
     return [_entry(one, samples[number] / base, unit, sample) for number, one in enumerate(ready)]
 
 

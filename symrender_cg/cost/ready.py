@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from symrender_cg.build.cache import Cache
 from symrender_cg.cost.variants import Way
+from symrender_cg.lower.variants import variant
 from symrender_cg.pipeline import (
     Translation,
     build_kernel,
@@ -115,6 +116,14 @@ def _translated(way: Way, scene: Scene, size: tuple[int, int]) -> Translation:
 def _recipe(way: Way, translation: Translation) -> str:
     baked = tuple(sorted(numbers_of(translation.plan.scene).items())) if way.bake else ()
     return recipe_of(translation.plan, translation.variant.key, baked, portable=False)
+
+
+def recipe_for(way: Way, scene: Scene, size: tuple[int, int] = (1, 1)) -> str:
+    """What the way's kernel is recalled by, without deriving it; for a way that is one kernel."""
+    plan = planned(scene, force=way.force, aspect=size[0] / size[1], max_error=way.tolerance)
+    drawn = way.variant if way.choices else variant(drawn_as(scene, way.level))
+    baked = tuple(sorted(numbers_of(plan.scene).items())) if way.bake else ()
+    return recipe_of(plan, drawn.key, baked, portable=False)
 
 
 def _changed(way: Way) -> bool:

@@ -24,7 +24,7 @@ from symrender_cg.cost.ready import subsamples
 from symrender_cg.cost.report import Errors
 from symrender_cg.errors import AccuracyError
 from symrender_cg.reference import oracle
-from symrender_cg.reference.points import near_highlight, near_silhouette, near_terminator
+from symrender_cg.reference.hard_places import near_highlight, near_silhouette, near_terminator
 from symrender_cg.scene import Gradient, Phong, PointLight, Scene
 
 Floats = NDArray[np.float64]

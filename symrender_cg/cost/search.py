@@ -15,7 +15,7 @@ order. What is dominated is found by a short measurement on points of the search
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -26,7 +26,7 @@ from symrender_cg.cost.ready import Ready, make_ready
 from symrender_cg.cost.report import Entry, Spread
 from symrender_cg.cost.sample import Sample, draw_sample, errors_of
 from symrender_cg.cost.timing import interleaved
-from symrender_cg.cost.variants import STARTS, Way, baked, combined, moved, named_ways
+from symrender_cg.cost.variants import STARTS, Way, baked, combined, content, moved, named_ways
 from symrender_cg.pipeline import planned
 from symrender_cg.scene import Scene
 
@@ -113,12 +113,6 @@ def search(
 
 def _of_one_level(ways: Sequence[Way], count: int) -> list[tuple[Way, ...]]:
     return [group for group in combinations(ways, count) if len({way.level for way in group}) == 1]
-
-
-def content(way: Way) -> object:
-    """What tells ways apart that would be drawn the same: the variant but for its name, and how it is planned."""
-    bare = replace(way.variant, name="", promise="")
-    return bare, way.target, way.bake, way.force, way.tolerance, way.side, way.maker, way.cse
 
 
 def _screened(ready: Ready, ratios: NDArray[np.float64], sample: Sample) -> Entry:

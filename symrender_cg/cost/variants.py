@@ -99,6 +99,38 @@ def named_ways(scene: Scene, size: tuple[int, int]) -> tuple[Way, ...]:
     return tuple(ways)
 
 
+def requestable(scene: Scene, *, bake: bool = False, aspect: float | None = None) -> tuple[Way, ...]:
+    """What a request may be drawn with, of all the ways there are: every level and every combination of moves from it
+    whose hits and misses are exact; with `bake` the same with the scene's numbers folded in; plans within a tolerance.
+
+    Left out are references, supersampling, general plans, and what decides outlines in floating point.
+    """
+    found = planned(scene, aspect=aspect)
+    known: dict[Variant, Way] = {}
+    layer = [way for way in _levels() if way.variant.exact and _possible(found, way)]
+    while layer:
+        for way in layer:
+            known.setdefault(nameless(way.variant), way)
+        nearby = {nameless(one.variant): one for way in layer for one in moved(way, scene, (1, 1))}
+        layer = [way for key, way in nearby.items() if key not in known and way.variant.exact]
+    ways = list(known.values())
+    if bake:
+        ways += [one for way in ways if (one := baked(way)) is not None and _possible(found, one)]
+    if found.arrangement is not None:
+        ways += [way for way in _tolerant(scene, found, aspect) if way.variant.exact and _possible(found, way)]
+    return tuple(ways)
+
+
+def content(way: Way) -> object:
+    """What tells ways apart that would be drawn the same: the variant but for its name, and how it is planned."""
+    return nameless(way.variant), way.target, way.bake, way.force, way.tolerance, way.side, way.maker, way.cse
+
+
+def nameless(given: Variant) -> Variant:
+    """The variant without its name and promise: what tells apart kernels that differ."""
+    return replace(given, name="", promise="")
+
+
 @lru_cache(maxsize=256)
 def way_of(name: str) -> Way:
     """The level or choice of that name: `double`, `certified float32`, `single_fused`. KeyError for another name."""
@@ -184,14 +216,21 @@ def _plans(scene: Scene, found: Plan, size: tuple[int, int]) -> list[Way]:
     if optional:
         does = "all effects forced in that the plan leaves out"
         ways.append(Way(f"{DEFAULT} unplanned", "general", does, DEFAULT, force=tuple(optional)))
+    ways += _tolerant(scene, found, size[0] / size[1])
+    return [way for way in ways if _possible(found, way)]
+
+
+def _tolerant(scene: Scene, found: Plan, aspect: float | None) -> list[Way]:
+    """`fast` and `double` by the plans that leave out what is within a tolerance, where they leave out more."""
+    ways = []
     for tolerance in TOLERANCES:
-        less = planned(scene, aspect=size[0] / size[1], max_error=tolerance)
+        less = planned(scene, aspect=aspect, max_error=tolerance)
         if less.bound > 0.0:
             does = f"leaves out what changes no pixel by more than {tolerance:g} (proved: {less.bound:.2g})"
             ways += [
                 Way(f"{level} -{tolerance:g}", "plan", does, level, tolerance=tolerance) for level in ("fast", DEFAULT)
             ]
-    return [way for way in ways if _possible(found, way)]
+    return ways
 
 
 def _possible(found: Plan, way: Way) -> bool:

@@ -7,7 +7,8 @@
     matte, glossy     n.l and the highlight of a point
     fading            how a point light fades with its distance
     shadow            whether a sphere stands between a point and a lamp
-    echo, echo_plane  a mirrored ray and what it meets; arrival: the normal there
+    echo, echo_plane  a mirrored ray and what it meets
+    arrival, landing  the normal there and the ray mirrored once more; in two words, if asked for
     gradient          the background of a direction
 
 span, near, lamp, matte and glossy are cut from the derivation of one sphere, form by form the same. The others are
@@ -17,7 +18,7 @@ sphere, where the point is the normal; the eye and its height above the plane.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import sympy as sp
@@ -43,6 +44,12 @@ class Part:
     rates    of inputs: "sphere" changes with the receiver, the light or the blocker, "pixel" with the point
     arrays   inputs that another part wrote for every point
     ends     the two ends of a row's span of hits, where it has them
+
+    Where mirrors would magnify what rounding leaves, points and rays go from part to part in two words:
+
+    in_full       results that are computed so, and whose first word is the nearest float64
+    second_words  results that stay as they are, and whose second word is computed beside them
+    low_inputs    inputs that come in two words, of which what is computed beside makes use
     """
 
     name: str
@@ -51,12 +58,16 @@ class Part:
     rates: tuple[tuple[str, str], ...]
     arrays: tuple[str, ...] = ()
     ends: tuple[str, str] | None = None
+    in_full: tuple[str, ...] = ()
+    second_words: tuple[str, ...] = ()
+    low_inputs: tuple[str, ...] = ()
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names that are used and not defined, in the order of the alphabet."""
         defined = {definition.name for definition in self.definitions}
         used = {s.name for definition in self.definitions for s in definition.value.free_symbols}
+        used |= {low(name) for name in self.low_inputs}
         return tuple(sorted(used - defined))
 
     def closed(self, name: str) -> sp.Expr:
@@ -104,10 +115,35 @@ _SPHERE = tuple((name, "sphere") for name in ("center_x", "center_y", "center_z"
 _PRIMARY = (*_SPHERE, ("y", "row"), ("x", "pixel"))
 
 
-def sphere_part(*, near: bool, mirrored: bool) -> Part:
+def low(name: str) -> str:
+    """The name of the second word of an input that comes in two."""
+    return f"{name}_low"
+
+
+def with_low_words(part: Part, names: tuple[str, ...]) -> Part:
+    """The part with those inputs in two words: each is the sum of its own and of a second, small one.
+
+    (p_x, ...) -> (p_x + p_x_low, ...), under the name full_p_x
+    """
+    full = {S(name): S(f"full_{name}") for name in names}
+    heads = tuple(
+        Definition(f"full_{name}", S(name) + S(low(name)), "inputs in full", "both words" if i == 0 else "")
+        for i, name in enumerate(names)
+    )
+    body = tuple(replace(definition, value=definition.value.xreplace(full)) for definition in part.definitions)
+    rates = dict(part.rates)
+    return replace(
+        part,
+        definitions=heads + body,
+        rates=(*part.rates, *((low(name), rates[name]) for name in names if name in rates)),
+        arrays=(*part.arrays, *(low(name) for name in names if name in part.arrays)),
+    )
+
+
+def sphere_part(*, near: bool, mirrored: bool, in_full: bool = False) -> Part:
     """A sphere seen by the eye; `near`: it reaches the plane of the eye, so each pixel is tested.
 
-    `mirrored`: with the eye's ray mirrored at it.
+    `mirrored`: with the eye's ray mirrored at it; `in_full`: of point and mirrored ray also the second words.
     """
     section = "distance"
     x, y, focal = symbols("x y focal")
@@ -147,7 +183,12 @@ def sphere_part(*, near: bool, mirrored: bool) -> Part:
     results += ("mirror_x", "mirror_y", "mirror_z", "inv_d2") if mirrored else ()
     definitions = _cut((*program.definitions, *more), results)
     return Part(
-        "near" if near else "span", definitions, results, _PRIMARY, ends=None if near else ("x_left", "x_right")
+        "near" if near else "span",
+        definitions,
+        results,
+        _PRIMARY,
+        ends=None if near else ("x_left", "x_right"),
+        second_words=(*_xyz("n"), *_xyz("mirror")) if in_full else (),
     )
 
 
@@ -273,8 +314,11 @@ _PLANE = tuple((f"plane_{axis}", "sphere") for axis in "xyz")
 """The unit normal of the plane, on the eye's side of it."""
 
 
-def plane_part(*, mirrored: bool) -> Part:
-    """The plane seen by the eye: the point P - E in heights of the eye above it, and where the ray meets it at all."""
+def plane_part(*, mirrored: bool, in_full: bool = False) -> Part:
+    """The plane seen by the eye: the point P - E in heights of the eye above it, and where the ray meets it at all.
+
+    `in_full`: its normal in two words, and of the point and the mirrored ray also the second words.
+    """
     section = "ground plane"
     x, y, focal = symbols("x y focal")
     ray = sp.Matrix([x, y, -focal])
@@ -295,9 +339,11 @@ def plane_part(*, mirrored: bool) -> Part:
             *_vector("mirror", ray + S("bounce") * normal, section, "the ray mirrored at the plane"),
         ]
         results += ("inv_d2", *_xyz("mirror"))
-    return Part(
-        "plane", tuple(definitions), results, (*((n, "frame") for n, _ in _PLANE), ("y", "row"), ("x", "pixel"))
-    )
+    rates = (*((n, "frame") for n, _ in _PLANE), ("y", "row"), ("x", "pixel"))
+    part = Part("plane", tuple(definitions), results, rates)
+    if not in_full:
+        return part
+    return replace(part, second_words=(*_xyz("p"), *_xyz("mirror")), low_inputs=_xyz("plane"))
 
 
 def tiles_part() -> Part:
@@ -337,8 +383,12 @@ def echo_part(point: str) -> Part:
     return Part("echo", definitions, ("disc", "ahead", "t"), rates, arrays)
 
 
-def arrival_part(point: str) -> Part:
-    """The normal where a mirrored ray meets the sphere, and the ray mirrored once more."""
+def arrival_part(point: str, *, in_full: bool = False, grounded: bool = False) -> Part:
+    """The normal where a mirrored ray meets the sphere, and the ray mirrored once more.
+
+    `in_full`: point and ray come and go in two words, and the way from sphere to sphere follows from the scene's own
+    numbers; `grounded`: the ray may start on the plane, whose unit has two words.
+    """
     echo = echo_part(point)
     section = "normal"
     ray, cross, normal = vector("mirror"), vector("cross"), vector("n")
@@ -351,7 +401,23 @@ def arrival_part(point: str) -> Part:
     )
     results = (*_xyz("n"), *_xyz("next"), "inv_d2")
     rates = tuple((name, rate) for name, rate in echo.rates if name != "reach")
-    return Part("arrival", _cut(definitions, results), results, rates, echo.arrays)
+    if not in_full:
+        return Part("arrival", _cut(definitions, results), results, rates, echo.arrays)
+    own, seen, between = vector("own"), vector("seen"), "from sphere to sphere"
+    way = (
+        *_vector("link", (seen - own) / S("reach"), between, "the centre seen from the mirror's, in radii"),
+        Definition("shrink", S("own_radius") / S("reach"), between, "the mirror's unit in radii"),
+    )
+    given = ((name, "sphere") for name in (*_xyz("own"), *_xyz("seen"), "own_radius", "reach"))
+    part = Part(
+        "arrival",
+        _cut((*way, *definitions), results),
+        results,
+        (*given, *((name, "pixel") for name in echo.arrays)),
+        echo.arrays,
+        in_full=(*_xyz("n"), *_xyz("next")),
+    )
+    return with_low_words(part, (*echo.arrays, *(("own_radius",) if grounded else ())))
 
 
 def echo_plane_part(point: str) -> Part:
@@ -379,6 +445,27 @@ def echo_plane_part(point: str) -> Part:
         *((name, "pixel") for name in arrays),
     )
     return Part("echo_plane", definitions, ("descent", "t", *_xyz("foot"), *_xyz("next"), "inv_d2"), rates, arrays)
+
+
+def landing_part(point: str) -> Part:
+    """Where a mirrored ray meets the plane, and the ray mirrored there, in two words from two words."""
+    echo = echo_plane_part(point)
+    own, section = vector("own"), "from sphere to plane"
+    eye = sp.Matrix([0, 0, S("eye_z")])
+    way = (
+        *_vector("origin", (own - eye) / S("height"), section, "the mirror's centre seen from the eye, in heights"),
+        Definition("scale", S("own_radius") / S("height"), section, "the mirror's unit in heights"),
+    )
+    words = (*_xyz("foot"), *_xyz("next"))
+    results = (*words, "inv_d2")
+    slow = (*_xyz("own"), "eye_z", "own_radius", "height")
+    rates = (
+        *((name, rate) for name, rate in echo.rates if rate != "sphere"),
+        *((name, "sphere") for name in slow),
+    )
+    definitions = _cut((*way, *echo.definitions), results)
+    part = Part("landing", definitions, results, rates, echo.arrays, in_full=words)
+    return with_low_words(part, (*_xyz("plane"), "height", "own_radius", *echo.arrays))
 
 
 def gradient_part() -> Part:

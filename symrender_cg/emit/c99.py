@@ -38,6 +38,7 @@ SUPPORT = {
     "double_double.h": ("dd_",),
     "pair.h": ("pair_",),
     "precise_power.h": ("precise_power_of_cosine",),
+    "whole_power.h": ("whole_powers_of_square", "whole_powers_of_pair"),
     "exact_sign.h": None,
     "range.h": None,
     "settle.h": None,
@@ -45,6 +46,7 @@ SUPPORT = {
 """Support headers and the functions that call for them, in the order in which they are included."""
 
 CARRIED = {
+    "whole_power.h": ("pair.h", "double_double.h"),
     "phong_power.h": ("power.h",),
     "fast_power.h": ("power.h",),
     "coarse_power.h": ("fast_power.h", "power.h"),
@@ -93,6 +95,7 @@ def emit(
     writer = Bodies(program, baked=numbers is not None)
     shared = tuple(program[entry] for stage in program.stages[: program.mirrored] for entry in stage)
     uses = {node.function for step in program.steps for node in walk(step.value) if isinstance(node, Call)}
+    uses |= {program.shortcut.function} if program.shortcut else set()
     formats = {step.format for step in program.steps}
     always = {"inline.h"}
     always |= {"exact_sign.h"} if variant.exact and (program.ends or not variant.settles) else set()
@@ -114,6 +117,7 @@ def emit(
         "includes": includes,
         "real": variant.c_type,
         "single": variant.shading == "float32",
+        "side_type": "float" if variant.shading == "float32" else "double",
         "span": program.ends is not None,
         "exact": variant.exact,
         "scaled": "plane_unit" in program,

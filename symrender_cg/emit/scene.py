@@ -12,20 +12,24 @@ from dataclasses import dataclass
 from symrender_cg.derive import parts
 from symrender_cg.derive.exact import sign_tests
 from symrender_cg.derive.image import derive_sphere
-from symrender_cg.derive.margins import gate_part, with_margin
-from symrender_cg.derive.parts import Part
+from symrender_cg.derive.margins import MOST_TURN, gate_part, with_margin
+from symrender_cg.derive.parts import Part, low
 from symrender_cg.emit.bodies import INDENT, body, closure, counts, operations
 from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test, support_files
 from symrender_cg.emit.parts import PrimaryBodies
 from symrender_cg.emit.scene_fields import Needs, field_lines, scene_fields
+from symrender_cg.lower.formats import WIDE
 from symrender_cg.lower.nodes import Call, walk
 from symrender_cg.lower.program import RATES, KernelProgram
 from symrender_cg.lower.variants import MOST_ROUNDOFFS, Variant
 from symrender_cg.plan.plan import Plan
 from symrender_cg.version import VERSION
 
-_OF_THE_PLANE = {"blur": "blurred", "drift": "drifted"}
-"""What the plane gives points that it shows; of spheres both are 1."""
+_GIVEN_AS = {"blur": "blurred", "turn": "turned"}
+"""Arrays of the points by what a part calls the quantity that it gives them; the blur of spheres is 1."""
+
+_LOW = tuple(low(f"{stem}_{axis}") for stem in ("p", "mirror") for axis in "xyz")
+"""Arrays of second words, where points and rays have two."""
 
 _LOOP = 2 * INDENT
 _DEEP = 3 * INDENT
@@ -59,14 +63,14 @@ class Primary:
 
 def scene_parts(need: Needs, *, marks: bool = False) -> dict[str, Part]:
     """The parts of the derivation that a scene's kernel is made of; `marks`: with the margins of what they decide."""
-    bent = need.specular or need.mirrors
+    bent, in_full = need.specular or need.mirrors, marks and need.mirrors
     found: list[Part] = []
     if need.spans:
-        found.append(parts.sphere_part(near=False, mirrored=bent))
+        found.append(parts.sphere_part(near=False, mirrored=bent, in_full=in_full))
     if need.at_eye:
-        found.append(parts.sphere_part(near=True, mirrored=bent))
+        found.append(parts.sphere_part(near=True, mirrored=bent, in_full=in_full))
     if need.plane:
-        found.append(parts.plane_part(mirrored=bent))
+        found.append(parts.plane_part(mirrored=bent, in_full=in_full))
     if need.checker:
         found.append(parts.tiles_part())
     if need.lit:
@@ -80,22 +84,19 @@ def scene_parts(need: Needs, *, marks: bool = False) -> dict[str, Part]:
     if need.shadows:
         found.append(parts.shadow_part("p"))
     if need.mirrors:
-        found += [parts.echo_part("p"), parts.arrival_part("p")]
+        found += [parts.echo_part("p"), parts.arrival_part("p", in_full=in_full, grounded=need.plane)]
         if need.plane:
             found.append(parts.echo_plane_part("p"))
+        if need.plane and in_full:
+            found.append(parts.landing_part("p"))
     if need.gradient:
         found.append(parts.gradient_part())
-    return {part.name: with_margin(part, blurred=_blurred(need)) if marks else part for part in found}
+    return {part.name: with_margin(part, blurred=need.plane) if marks else part for part in found}
 
 
 def marks_doubt(variant: Variant) -> bool:
     """Whether the kernel of a level lists the pixels that rounding may have decided, for somebody else to settle."""
     return variant.shading == "float64" and variant.exact
-
-
-def _blurred(need: Needs) -> bool:
-    """Whether rounding moves some points more than others: on the plane, and beyond a mirror."""
-    return need.plane or need.mirrors
 
 
 def emit_scene(
@@ -111,11 +112,11 @@ def emit_scene(
     single = variant.shading == "float32"
     real = "float" if single else "double"
     marks, stored = marks_doubt(variant), _stored(need)
-    if marks:
-        stored += ("blur",) if _blurred(need) else ()
-        stored += ("drift",) if need.mirrors else ()
+    in_full = marks and need.mirrors
+    stored += ("blur",) if marks and need.plane else ()
+    stored += ("turn", *_LOW) if in_full else ()
     primaries = [_primary(programs[key], need, stored) for key in ("span", "near", "plane") if key in programs]
-    fields = scene_fields(need)
+    fields = scene_fields(need, in_full=in_full)
     lines = field_lines(fields)
     writer = _Loops(programs, need, marks)
     includes = _includes(programs, need)
@@ -135,8 +136,10 @@ def emit_scene(
     context = {
         "marks": marks,
         "row_marks": marks and (contested or need.plane),
-        "blurred": _blurred(need),
+        "blurred": need.plane,
+        "in_full": in_full,
         "most_roundoffs": MOST_ROUNDOFFS,
+        "most_turn": float(MOST_TURN).hex(),
         "name": name,
         "version": VERSION,
         "command": command,
@@ -240,14 +243,18 @@ def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
 
 def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Primary:
     kind = program.name
-    wanted = [_OF_THE_PLANE.get(name, name) for name in stored]
-    bodies = PrimaryBodies(program, wanted, parts.OUTLINE if kind == "span" else ())
+    sources = [_source(name, of_sphere=kind != "plane") for name in stored]
+    bodies = PrimaryBodies(program, sources, parts.OUTLINE if kind == "span" else ())
     given = [("ball", f"const {kind}_sphere *ball")] if bodies.has_sphere else []
     given.append(("f", f"const {kind}_frame *f"))
     names = [name for name, _ in given]
     distance = bodies.pixel(("hit_distance",) if bodies.has_sphere else ("hit_distance", "descent"))
     sight = bodies.sight() if bodies.has_sphere else []
-    stores = [f"p->{target}[at + i] = {bodies.carried_word(source)};" for target, source in _targets(bodies, stored)]
+    stores = [
+        f"p->{target}[at + i] = {bodies.carried_word(source)};"
+        for target, source in zip(stored, sources, strict=True)
+        if source in program
+    ]
     tests = hit_tests(near=kind == "near") if bodies.has_sphere else ()
     return Primary(
         name=kind,
@@ -268,17 +275,10 @@ def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Prim
     )
 
 
-def _targets(bodies: PrimaryBodies, stored: Sequence[str]) -> list[tuple[str, str]]:
-    """Which array takes which quantity: a sphere's point, seen from its centre in radii, is its normal."""
-    pairs = []
-    for name in stored:
-        source = name.replace("p_", "n_") if name.startswith("p_") and bodies.has_sphere else name
-        if name in _OF_THE_PLANE:
-            if bodies.has_sphere:
-                continue
-            source = _OF_THE_PLANE[name]
-        pairs.append((name, source))
-    return pairs
+def _source(name: str, *, of_sphere: bool) -> str:
+    """The quantity that an array takes: a sphere's point, seen from its centre in radii, is its normal."""
+    source = _GIVEN_AS.get(name, name)
+    return source.replace("p_", "n_") if source.startswith("p_") and of_sphere else source
 
 
 def _void(lines: Iterable[str], names: Iterable[str]) -> str:
@@ -307,9 +307,11 @@ def _includes(programs: Mapping[str, KernelProgram], need: Needs) -> list[str]:
         for node in walk(step.value)
         if isinstance(node, Call)
     }
+    formats = {step.format for program in programs.values() for step in program.steps}
     always = {"inline.h", "units.h"}
     always |= {"span.h"} if need.spans else set()
     always |= {"double_double.h", "exact_sign.h"} if need.spheres else set()
+    always |= {"double_double.h", "pair.h"} if "pair" in formats else set()
     return [
         header
         for header, functions in SUPPORT.items()
@@ -381,15 +383,16 @@ class _Loops:
             margin = ("margin",) if self.marks else ()
             found |= self._loop("echo", "echo", ("disc", "ahead", "t", *margin))
             found |= self._loop("arrival", "arrival")
-            found["arrival_stores"] = self._stores(("n", "n"), ("mirror", "next"), own="n")
+            found["arrival_stores"] = self._stores("arrival", ("n", "n"), ("mirror", "next"), point="n")
             if need.plane:
                 first = ("descent", "t", *(("foot_x", "foot_y", "foot_z") if need.checker else ()), *margin)
                 first += ("blurred",) if self.marks and need.checker else ()
                 found |= self._loop("echo_plane", "echo_plane", first)
                 second = ("foot_x", "foot_y", "foot_z", "next_x", "next_y", "next_z", "inv_d2")
-                told = ("blurred", "drifted") if self.marks else ()
-                found |= self._loop("landing", "echo_plane", (*second, *told))
-                found["landing_stores"] = self._stores(("p", "foot"), ("mirror", "next"), ("n", "plane"), own=None)
+                told = ("blurred", "turned") if self.marks else ()
+                landing, normal = ("landing", "full_plane") if self.marks else ("echo_plane", "plane")
+                found |= self._loop("landing", landing, (*second, *told))
+                found["landing_stores"] = self._stores(landing, ("mirror", "next"), ("n", normal), point="foot")
         return found
 
     def _loop(
@@ -405,15 +408,37 @@ class _Loops:
         arrays = self.parts[part].arrays
         places = dict.fromkeys(arrays, "p->{}[i]")
         places |= {f"p_{axis}": f"=p->{self.point}_{axis}[i]" for axis in "xyz"}
+        places |= _WAY if self.parts[part].in_full else {}
         steps = program.steps if results is None else closure(program.steps, results)
         before = [step for step in steps if step.rate != "pixel"]
         inside = [step for step in steps if step.rate == "pixel"]
         return {f"{key}_lines": body(inside, places, indent), f"{key}_head": body(before, places, head)}
 
-    def _stores(self, *pairs: tuple[str, str], own: str | None) -> list[str]:
+    def _stores(self, part: str, *pairs: tuple[str, str], point: str) -> list[str]:
+        """What a point that is seen in a mirror keeps: arrays by the stems of their quantities, and where it lies."""
+        format_of = {step.name: step.format for step in self.programs[part].steps}
+        pairs = (*pairs, ("p", point)) if self.need.plane else pairs
         lines = []
-        if own is not None and self.need.plane:
-            pairs = (*pairs, ("p", own))
         for target, source in pairs:
-            lines += [f"{_LOOP}child->{target}_{axis}[j] = {source}_{axis};" for axis in "xyz"]
-        return [*lines, f"{_LOOP}child->inv_d2[j] = inv_d2;"]
+            for axis in "xyz":
+                word = f"{source}_{axis}.hi" if format_of.get(f"{source}_{axis}") in WIDE else f"{source}_{axis}"
+                lines.append(f"child->{target}_{axis}[j] = {word};")
+        lines.append(f"child->inv_d2[j] = inv_d2{'.hi' if format_of['inv_d2'] in WIDE else ''};")
+        if self.marks:
+            stems = {"p": point, "mirror": "next"}
+            lines += [f"child->{low(f'{k}_{axis}')}[j] = {stems[k]}_{axis}.lo;" for k in stems for axis in "xyz"]
+        return [_LOOP + line for line in lines]
+
+
+_WAY = {
+    **{f"own_{axis}": f"=scene->center_{axis}[of]" for axis in "xyz"},
+    **{f"seen_{axis}": f"=scene->center_{axis}[k]" for axis in "xyz"},
+    "own_radius": "=scene->radius[of]",
+    "own_radius_low": "=scene->radius_low[of]",
+    "reach": "=scene->radius[k]",
+    "eye_z": "=scene->center_z[scene->spheres]",
+    "height": "=scene->radius[scene->spheres]",
+    "height_low": "=scene->radius_low[scene->spheres]",
+    **{f"plane_{axis}{end}": f"=scene->plane_{axis}{end}" for axis in "xyz" for end in ("", low(""))},
+}
+"""Where the numbers of a mirror, of what is seen in it, and of the plane are, for the parts that take them in full."""

@@ -82,8 +82,8 @@ def field_lines(fields: tuple[Field, ...]) -> tuple[Line, ...]:
     return tuple(lines)
 
 
-def scene_fields(need: Needs) -> tuple[Field, ...]:
-    """The fields of a kernel's scene structure, in their order."""
+def scene_fields(need: Needs, *, in_full: bool = False) -> tuple[Field, ...]:
+    """The fields of a kernel's scene structure, in their order; `in_full`: what no float64 holds in two words."""
     c = f"[{need.channels}]"
     fields: list[tuple[bool, str, Shape, str]] = [
         (True, "eye", "number", "distance of the eye from the image plane"),
@@ -94,6 +94,7 @@ def scene_fields(need: Needs) -> tuple[Field, ...]:
         (True, "center_y", "reals", ""),
         (True, "center_z", "reals", ""),
         (True, "radius", "reals", "[receivers] radius; for the plane the eye's height above it"),
+        (need.plane and in_full, "radius_low", "reals", "[receivers] what rounding left of that height; else 0"),
         (need.at_eye and need.spans, "at_eye", "wholes", "[visible] the sphere reaches the plane of the eye"),
         (need.intersections, "partners_begin", "wholes", "[visible + 1] lists of the spheres before it"),
         (need.intersections, "partners", "wholes", "that a sphere intersects"),
@@ -124,6 +125,9 @@ def scene_fields(need: Needs) -> tuple[Field, ...]:
         (need.plane, "plane_x", "number", "unit normal of the plane, on the eye's side"),
         (need.plane, "plane_y", "number", ""),
         (need.plane, "plane_z", "number", ""),
+        (need.plane and in_full, "plane_x_low", "number", "and what rounding left of it"),
+        (need.plane and in_full, "plane_y_low", "number", ""),
+        (need.plane and in_full, "plane_z_low", "number", ""),
         (need.checker, "across_x", "number", "a tile's number across: floor(across.p + across_0)"),
         (need.checker, "across_y", "number", ""),
         (need.checker, "across_z", "number", ""),

@@ -10,8 +10,9 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from symrender_cg.emit.bodies import INDENT, WIDTH, body, counts, declared
+from symrender_cg.emit.bodies import INDENT, WIDTH, body, counts, declared, wrap
 from symrender_cg.emit.printer import C_TYPES
+from symrender_cg.lower.anchors import anchoring
 from symrender_cg.lower.fission import crossing
 from symrender_cg.lower.formats import WIDE
 from symrender_cg.lower.nodes import Select, walk
@@ -25,7 +26,7 @@ class Stage:
 
     mirrored   it is the same for x and -x
     sided      it reads what is odd in x, with the sign of `side`
-    takes      which of x, row and frame it reads
+    takes      which of x, place, row and frame it reads
     replaced   the shortcut of the program computes what it leaves, where it may
     """
 
@@ -39,12 +40,13 @@ class Stage:
 
     def parameters(self, real: str) -> str:
         """The parameters of the C function."""
-        kinds = {"x": "double x", "side": f"{real} side", "row": "const row *r", "frame": "const frame *f"}
+        kinds = {"x": "double x", "place": "place p", "side": f"{real} side"}
+        kinds |= {"row": "const row *r", "frame": "const frame *f"}
         return ", ".join([*(kinds[name] for name in kinds if name in self._named), "block *b", "int i"])
 
     def call(self, **given: str) -> str:
         """A call of it, its arguments by the words of `takes`, `side` and `block`."""
-        order = ("x", "side", "row", "frame")
+        order = ("x", "place", "side", "row", "frame")
         arguments = [*(given[name] for name in order if name in self._named), given["block"], "i"]
         return f"stage_{self.number}({', '.join(arguments)})"
 
@@ -54,19 +56,36 @@ class Stage:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """Where a pixel lies in its row: the names of its numbers, and the lines that compute them from x.
+
+    counted    the same numbers for a pixel between the `first` hit of a row and the `last`
+    reads      which of row and frame the lines read
+    """
+
+    names: tuple[str, ...]
+    lines: tuple[str, ...]
+    counted: tuple[str, ...]
+    reads: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
 class Stages:
     """All stages of a kernel, and the arrays of the block between them, a type at a time."""
 
     each: tuple[Stage, ...]
     arrays: tuple[str, ...]
     shortcut: Shortcut | None = None
+    wide: frozenset[str] = frozenset()
+    place: Place | None = None
 
-    def shortcut_call(self, block: str, frame: str, count: str) -> str:
-        """The call that computes a step for a block."""
+    def shortcut_call(self, block: str, frame: str, count: str, indent: str) -> str:
+        """The call that computes a step for a block, its later lines indented."""
         assert self.shortcut is not None, "there is one"
         cut = self.shortcut
-        held = ", ".join(f"{block}{name}" for name in (cut.source, cut.room, cut.result))
-        return f"{cut.function}({held}, {frame}{cut.when}, {count})"
+        held = ", ".join(f"{block}{word}" for name in cut.held for word in words(name, name in self.wide))
+        lines = wrap(f"{cut.function}({held}, {frame}{cut.when}, {count});", indent[: -len(INDENT)], indent)
+        return "\n".join(lines).strip().removesuffix(";")
 
     @property
     def mirrored(self) -> tuple[Stage, ...]:
@@ -95,28 +114,55 @@ def stages_of(program: KernelProgram, frame: Mapping[str, str], places: Mapping[
         return None
     parity = parities(program) if program.mirrored else {}
     later = {used for stage in program.stages[1:] for name in stage for used in program[name].uses()}
-    leaves = list(crossing(program))
-    leaves[-1] = (*leaves[-1], program.result)
+    crossed = list(crossing(program))
+    crossed[-1] = (*crossed[-1], program.result)
     if program.shortcut is not None:
         for number, names in enumerate(program.stages):
-            if program.shortcut.source in names and program.shortcut.source not in leaves[number]:
-                leaves[number] = (*leaves[number], program.shortcut.source)
-    if "x" in later:
-        leaves[0] = ("x", *leaves[0])
+            held = (program.shortcut.source, program.shortcut.room)
+            crossed[number] += tuple(name for name in held if name in names and name not in crossed[number])
+    given = ("x", *(name for name, _ in program.anchors))
+    crossed[0] = (*(name for name in given if name in later), *crossed[0])
     formats = {step.name: step.format for step in program.steps} | {"x": "float64"}
-    carried = [name for names in leaves for name in names]
-    assert not any(formats[name] in WIDE for name in carried), "what crosses is one number"
+    wide = frozenset(name for names in crossed for name in names if formats[name] in WIDE)
+    judged = [tuple(name for name in program.judged if name in names) for names in program.stages]
+    leaves = [(*names, *(n for n in more if n not in names)) for names, more in zip(crossed, judged, strict=True)]
+    carried = [word for names in leaves for name in names for word in words(name, name in wide)]
+    places = {**places, **dict.fromkeys(given[1:], "p.")}
     done: set[str] = set()
     found: list[Stage] = []
     for number, (names, left) in enumerate(zip(program.stages, leaves, strict=True), 1):
         steps = tuple(program[name] for name in names)
         mirrored = number <= program.mirrored
-        found.append(_stage(number, steps, left, done, {} if mirrored else parity, places, formats, frame, mirrored))
+        side = {} if mirrored else parity
+        found.append(_stage(number, steps, left, done, side, places, formats, frame, mirrored, wide))
         done |= set(left)
-    arrays = declared((str(C_TYPES[formats[name]].name), f"{name}[POINTS]") for name in dict.fromkeys(carried))
+    kinds = {name: "double" if form in WIDE else str(C_TYPES[form].name) for name, form in formats.items()}
+    arrays = declared((kinds[name.removesuffix(_LOW)], f"{name}[POINTS]") for name in dict.fromkeys(carried))
     replaced = program.shortcut.stages if program.shortcut else ()
     each = tuple(replace(stage, replaced=stage.number - 1 in replaced) for stage in found)
-    return Stages(each, tuple(arrays), program.shortcut)
+    return Stages(each, tuple(arrays), program.shortcut, wide, _place_of(program, places))
+
+
+def _place_of(program: KernelProgram, places: Mapping[str, str]) -> Place | None:
+    """What the anchors of a program are in C, None where it has none."""
+    if not program.anchors:
+        return None
+    steps = anchoring(program)
+    own = dict.fromkeys((step.name for step in steps), "")
+    uses = {name for step in steps for name in step.uses()} - own.keys()
+    reads = {word for word, place in (("row", "r->"), ("frame", "f->")) if place in {places.get(n) for n in uses}}
+    ways = {"first": "from_first", "middle": "aside", "last": "to_last"}
+    counted = tuple(f".{name} = h->{where}.{name} + {ways[where]}," for name, where in program.anchors)
+    names = tuple(name for name, _ in program.anchors)
+    return Place(names, tuple(body(steps, {**places, **own})), counted, frozenset(reads))
+
+
+_LOW = "_lo"
+
+
+def words(name: str, wide: bool) -> tuple[str, ...]:
+    """The arrays of a quantity in a block: the high and the low words apart."""
+    return (name, name + _LOW) if wide else (name,)
 
 
 def _chosen(step: Step) -> set[str]:
@@ -135,26 +181,37 @@ def _stage(
     formats: Mapping[str, str],
     frame: Mapping[str, str],
     mirrored: bool,
+    wide: frozenset[str],
 ) -> Stage:
     own = {step.name for step in steps}
     uses = {name for step in steps for name in step.uses()} - own
     from_block = sorted(uses & done, key=list(formats).index)
     odd = [name for name in from_block if parity.get(name) == "odd"]
+    pairs = [name for name in from_block if name in wide]
     here = dict(places) | {name: "b->{}[i]" for name in from_block if name not in odd} | dict.fromkeys(own, "")
-    lines = [f"{INDENT}const {C_TYPES[formats[name]].name} {name} = side * b->{name}[i];" for name in odd]
+    lines = []
+    for name in dict.fromkeys((*odd, *pairs)):
+        told = [f"{'side * ' if name in odd else ''}b->{word}[i]" for word in words(name, name in wide)]
+        value = f"{{{', '.join(told)}}}" if name in wide else told[0]
+        lines.append(f"{INDENT}const {C_TYPES[formats[name]].name} {name} = {value};")
     chosen = sorted({name for step in steps for name in _chosen(step)} - own)
     read = {name: f"b->{name}[i]" for name in chosen if name in from_block and name not in odd}
     read |= {name: f"f->{name}" for name in chosen if frame.get(name) == "f->" and name in formats}
     here |= dict.fromkeys(read, "")  # read before they are chosen from: a read under a condition stops vectorisation
     lines += [f"{INDENT}const {C_TYPES[formats[name]].name} {name} = {place};" for name, place in read.items()]
     lines += [""] if lines else []
-    lines += body(steps, here | dict.fromkeys(odd, ""))
+    lines += body(steps, here | dict.fromkeys((*odd, *pairs), ""))
     lines.append("")
-    lines += [f"{INDENT}b->{name}[i] = {name};" for name in left]
+    for name in left:
+        from_place = places.get(name) == "p."
+        parts = (f"{name}.hi", f"{name}.lo") if formats[name] in WIDE else (f"p.{name}" if from_place else name,)
+        arrays = words(name, name in wide)
+        lines += [f"{INDENT}b->{word}[i] = {part};" for word, part in zip(arrays, parts, strict=False)]
     takes = {"x"} if "x" in uses - done else set()
+    takes |= {"place"} if any(places.get(name) == "p." for name in (uses - done) | set(left)) else set()
     takes |= {"row"} if any(place == "r->" for name, place in places.items() if name in uses) else set()
     takes |= {"frame"} if any(place == "f->" for name, place in frame.items() if name in uses) else set()
     sections = ", ".join(dict.fromkeys(step.section for step in steps))
-    told = f"Stage {number}{', the same for x and -x' if mirrored else ''}: {sections} [{counts(steps)}]."
-    told_lines = textwrap.wrap(f"{told} Leaves {', '.join(left)}.", WIDTH - 6, break_long_words=False)
+    heading = f"Stage {number}{', the same for x and -x' if mirrored else ''}: {sections} [{counts(steps)}]."
+    told_lines = textwrap.wrap(f"{heading} Leaves {', '.join(left)}.", WIDTH - 6, break_long_words=False)
     return Stage(number, mirrored, bool(odd), frozenset(takes), tuple(told_lines), tuple(lines))

@@ -33,6 +33,7 @@ MEANINGS: Final = {
     "echo": "a mirrored ray and a sphere",
     "arrival": "the normal where a mirrored ray arrives, and the ray mirrored once more",
     "echo_plane": "a mirrored ray and the plane",
+    "landing": "where a mirrored ray meets the plane, and the ray mirrored there, in two words",
     "gradient": "the background of a direction",
 }
 

@@ -69,7 +69,7 @@ def proof_of(scene: Scene, accuracy: str, target: str | None, *, width: int, hei
 
     Raises ArgumentError for an unknown level or target.
     """
-    job = job_of(scene, accuracy, target, clip=False)
+    job = job_of(scene, accuracy, target, clip=False, aspect=width / height)
     if job is None:
         return None
     found = planned(scene, aspect=width / height)

@@ -1,13 +1,17 @@
-"""The two short polynomials behind fast_power.h, fitted, rounded and proved.
+"""The three short polynomials behind fast_power.h, fitted, rounded and proved.
 
     log2(1 + f) = f p(f)        11/16 <= 1 + f <= 11/8
     2^r = 1 + r q(r)            -1/2 <= r <= 1/2
+    log2(1 - g) = -g s(g)       0 <= g <= 7/16, for exponents from 32 on
 
 Comes in: nothing. Goes out: `FastTables`, coefficients as rounded to float and the proved bounds of what the C text
 computes. Never done here: C text; that is `fast_header.py`.
 
 An error e of log2, relative, and d of 2^y make an absolute error v |ln v| e + v d <= e / exp(1) + d of a power v <= 1.
 With degrees 3 and 2 both are about 10^-4; one degree less of either, and one of them alone is beyond 2^-11.
+
+A lobe of a large exponent is narrow: where g > 7/16, (1 - g)^16 and what is computed for it lie between 0 and
+1.1 10^-4, so no logarithm is needed there, and none has to be split into exponent and mantissa.
 """
 
 from __future__ import annotations
@@ -37,9 +41,11 @@ from symrender_cg.functions.rounding import (
 )
 from symrender_cg.functions.supremum import PRECISION, Ball, ball, bound_of_quotient
 
-LOG_DEGREE, EXP2_DEGREE = 3, 2
+LOG_DEGREE, EXP2_DEGREE, LOBE_DEGREE = 3, 2, 3
+LEAST_LARGE_EXPONENT = 32
 LOG_INTERVAL = (LOWEST_MANTISSA - 1, HIGHEST_MANTISSA - 1)
 EXP2_INTERVAL = (Fraction(-1, 2), Fraction(1, 2))
+LOBE_INTERVAL = (Fraction(0), Fraction(7, 16))
 
 TAYLOR_TERMS = 60
 PIECES = 512
@@ -50,24 +56,30 @@ BINADES = range(-8, 1)
 
 @dataclass(frozen=True, slots=True)
 class FastTables:
-    """Coefficients, lowest first; `*_error` are the polynomials' relative errors, the others hold the roundings too."""
+    """Coefficients, lowest first; `*_error` are the polynomials' relative errors, the others hold the roundings too.
+
+    `lobe_bound` is that of y = n/2 log2(1 - g), `narrow_bound` the absolute one of a power of an exponent from 32 on.
+    """
 
     log: tuple[float, ...]
     exp2: tuple[float, ...]
+    lobe: tuple[float, ...]
     log_error: float
     exp2_error: float
     log_bound: float
     exp2_bound: float
     power_bound: float
+    lobe_bound: float
+    narrow_bound: float
 
 
 @functools.cache
 def fast_tables() -> FastTables:
     """Fit, round, and prove."""
     with mpmath.workdps(DIGITS):
-        log_ends, exp2_ends = (
+        log_ends, exp2_ends, lobe_ends = (
             tuple(mpmath.mpf(end.numerator) / end.denominator for end in interval)
-            for interval in (LOG_INTERVAL, EXP2_INTERVAL)
+            for interval in (LOG_INTERVAL, EXP2_INTERVAL, LOBE_INTERVAL)
         )
     log = fit_minimax(_log2_quotient, lambda f: 1 / _log2_quotient(f), (log_ends[0], log_ends[1]), LOG_DEGREE)
     exp2 = fit_minimax(
@@ -76,7 +88,10 @@ def fast_tables() -> FastTables:
         (exp2_ends[0], exp2_ends[1]),
         EXP2_DEGREE,
     )
-    p, q = tuple(map(FLOAT.round, log)), tuple(map(FLOAT.round, exp2))
+    lobe = fit_minimax(
+        lambda g: _log2_quotient(-g), lambda g: 1 / _log2_quotient(-g), (lobe_ends[0], lobe_ends[1]), LOBE_DEGREE
+    )
+    p, q, s = (tuple(map(FLOAT.round, found)) for found in (log, exp2, lobe))
     log_error, exp2_error = bound_log_error(p), bound_exp2_error(q)
     with flint.ctx.workprec(PRECISION):
         unit = ball(FLOAT.unit_roundoff)
@@ -84,12 +99,17 @@ def fast_tables() -> FastTables:
         exps = _exp2_errors(q, flint.arb(exp2_error), unit)
         exp2_bound = max(relative for _, _, relative in exps)
         power_bound = max(power_error(k, exps, log_bound, unit) for k in range(0, -24, -1))
-        return FastTables(p, q, log_error, exp2_error, upward(log_bound), upward(exp2_bound), upward(power_bound))
+        lobe_bound = _lobe_error(s, flint.arb(bound_lobe_error(s)), unit)
+        narrow_bound = max(
+            *(power_error(k, exps, lobe_bound, unit) for k in range(0, -24, -1)), _outside_lobe(s, exp2_bound)
+        )
+    found = map(upward, (log_bound, exp2_bound, power_bound, lobe_bound, narrow_bound))
+    return FastTables(p, q, s, log_error, exp2_error, *found)
 
 
 def _log2_quotient(f: Any) -> Any:
     """log2(1 + f) / f."""
-    return mpmath.log1p(f) / (f * mpmath.log(2))
+    return mpmath.log1p(f) / (f * mpmath.log(2)) if f else 1 / mpmath.log(2)
 
 
 def bound_log_error(coefficients: tuple[float, ...]) -> float:
@@ -119,6 +139,43 @@ def _log2_error(p: tuple[float, ...], fit: Ball, unit: Ball) -> Ball:
             rounded = absolute + half_ulp(above(k + true) + absolute, unit)
             largest = max(largest, above(rounded / below(k + true)))
     return largest
+
+
+def bound_lobe_error(coefficients: tuple[float, ...]) -> float:
+    """A proved bound of |g s(g) / log2(1 - g) + 1| over the interval.
+
+    -log2(1 - g) / g is 1 / ln 2 (1 + g/2 + g^2/3 + ...), whose terms from the 60th on sum to less than 10^-22 on
+    g <= 7/16, and at least the sum of its first four.
+    """
+    with flint.ctx.workprec(PRECISION):
+        log_2 = flint.arb(2).log()
+        terms = [1 / (log_2 * (k + 1)) for k in range(TAYLOR_TERMS)]
+        true = flint.arb_poly([terms[0] + flint.arb(0, 1e-22), *terms[1:]])
+        difference = flint.arb_poly([flint.arb(c) for c in coefficients]) - true
+        return bound_of_quotient(difference, lambda g: (1 + g / 2 + g**2 / 3 + g**3 / 4) / log_2, LOBE_INTERVAL)
+
+
+def _lobe_error(s: tuple[float, ...], fit: Ball, unit: Ball) -> Ball:
+    """Largest relative error of h g s(g) as C computes it, g given, h exact; below g = 2^-24 it is that of s(0)."""
+    log_2 = flint.arb(2).log()
+    largest = flint.arb(0)
+    for high, low in itertools.pairwise(octave_edges(LOBE_INTERVAL[1], SMALLEST_OCTAVE)):
+        g_ball = between(high, low)
+        g = Rounded(g_ball, flint.arb(0), unit)
+        product = g * exact(1.0, unit) * _by_pairs(s, g, g * g)  # h g: one rounding, relative; so is that of 1 g
+        true = -(1 - g_ball).log() / log_2
+        largest = max(largest, above((product.error + above(true) * fit) / below(true)))
+    return largest
+
+
+def _outside_lobe(s: tuple[float, ...], exp2_bound: Ball) -> Ball:
+    """The largest power beyond the interval, true or computed: both fall as g grows, for s has no negative member."""
+    assert min(s) > 0.0, "g s(g) grows with g"
+    g = ball(LOBE_INTERVAL[1])
+    half = ball(Fraction(LEAST_LARGE_EXPONENT, 2))
+    total = sum((flint.arb(c) * g**k for k, c in enumerate(s)), flint.arb(0))
+    computed = flint.arb(2) ** (-half * g * total * (1 - flint.arb("1e-5"))) * (1 + exp2_bound)
+    return max(above((1 - g) ** half), above(computed))
 
 
 def _exp2_errors(q: tuple[float, ...], fit: Ball, unit: Ball) -> list[tuple[Ball, Ball, Ball]]:

@@ -10,7 +10,7 @@ import math
 
 import jinja2
 
-from symrender_cg.functions.fast import EXP2_DEGREE, LOG_DEGREE, fast_tables
+from symrender_cg.functions.fast import EXP2_DEGREE, LEAST_LARGE_EXPONENT, LOBE_DEGREE, LOG_DEGREE, fast_tables
 from symrender_cg.functions.formats import FLOAT
 from symrender_cg.functions.header import rounded_up
 from symrender_cg.functions.power import HIGHEST_MANTISSA, LOWEST_MANTISSA
@@ -25,7 +25,7 @@ def render_fast_header(template: str) -> str:
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )
     tables = fast_tables()
-    p, q = ([FLOAT.literal(c) for c in coefficients] for coefficients in (tables.log, tables.exp2))
+    p, q, s = ([FLOAT.literal(c) for c in coefficients] for coefficients in (tables.log, tables.exp2, tables.lobe))
     return environment.from_string(template).render(
         bound=rounded_up(tables.power_bound),
         macro=f"0x1p{math.ceil(math.log2(tables.power_bound))}f",
@@ -43,5 +43,10 @@ def render_fast_header(template: str) -> str:
         fraction_mask=FLOAT.bits(2**FLOAT.fraction_bits - 1),
         integer_bits=FLOAT.bits(FLOAT.bits_of(2.0**FLOAT.fraction_bits)),
         log_text=f"const float p = ({p[0]} + {p[1]} * f) + ({p[2]} + {p[3]} * f) * f2;",
+        lobe_text=f"const float s = ({s[0]} + {s[1]} * g) + ({s[2]} + {s[3]} * g) * g2;",
+        lobe_degree=LOBE_DEGREE,
+        lobe_bound=rounded_up(tables.lobe_bound),
+        narrow_bound=rounded_up(tables.narrow_bound),
+        least_large=LEAST_LARGE_EXPONENT,
         exp2_text=f"const float q = {q[0]} + r * ({q[1]} + r * {q[2]});",
     )

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from symrender_cg.lower.formats import WIDE
 from symrender_cg.lower.nodes import Call, Cast, Quotient, Root, walk
 from symrender_cg.lower.program import KernelProgram, Shortcut, Step, operations_of
 from symrender_cg.lower.symmetry import parities
@@ -24,6 +25,9 @@ from symrender_cg.lower.symmetry import parities
 ISSUED, IN_VIEW, CROSSING, LOOP = 3.0, 100.0, 1.0, 1.0
 """Operations issued a cycle; operations at which a stage takes as many cycles, by waiting; cycles of a value that
 crosses, and of a loop. Fitted to stages measured on AMD Zen 5. What matters: short loops win, and a cut has a price."""
+
+IN_VIEW_OF_PAIRS = 400.0
+"""The same where the operations are those of pairs: half of them wait for none of the others."""
 
 _SLOW: Mapping[type, int] = {Quotient: 4, Root: 7}
 """Divisions and square roots keep their unit busy for so many cycles."""
@@ -39,6 +43,22 @@ _CALLS: Mapping[str, int] = {
 _OTHER_CALL = 60
 """A whole power."""
 
+_WIDE_CALLS: Mapping[str, int] = {
+    **dict.fromkeys(("dd_from", "dd_neg", "dd_scale", "pair_select"), 2),
+    "dd_product": 2,
+    **dict.fromkeys(("dd_sum", "dd_difference", "pair_normalised"), 6),
+    **dict.fromkeys(("pair_mul_double", "pair_positive_part"), 3),
+    **dict.fromkeys(("pair_mul", "pair_square"), 4),
+    "pair_add_double": 7,
+    **dict.fromkeys(("pair_add", "pair_sub"), 8),
+    **dict.fromkeys(("pair_inverse", "pair_div"), 9),
+    "pair_sqrt": 18,
+    **dict.fromkeys(("dd_add_double", "dd_mul", "dd_mul_double"), 10),
+    **dict.fromkeys(("dd_add", "dd_sub"), 20),
+    "precise_power_of_cosine": 180,
+}
+"""Operations of double_double.h, pair.h and precise_power.h."""
+
 _SIMPLE = ("add", "mul", "max", "select")
 
 
@@ -47,47 +67,63 @@ def cut(program: KernelProgram, *, fission: bool, symmetry: bool) -> KernelProgr
 
     ray, normal, light, diffuse, specular  ->  (ray, normal), (what x and -x share), (light, diffuse), (log2), (2^y)
     """
-    pixel = _leading_to(program.at("pixel"), {program.result})
+    outcome = {program.result, *program.judged}
+    if all(step.name != program.result for step in program.at("pixel")):
+        return program  # the value is the same everywhere
+    anchors = dict(program.anchors)
+    pixel = _leading_to([step for step in program.at("pixel") if step.name not in anchors], outcome)
     parity = parities(program) if symmetry else {}
     shared = _leading_to(pixel, parity) if parity else ()
     names = {step.name for step in shared}
     rest = tuple(step for step in pixel if step.name not in names)
-    needed = {name for step in rest for name in step.uses()} | {program.result}
+    needed = {name for step in rest for name in step.uses()} | outcome
     first = _cut(shared, needed) if fission else tuple(tuple(s.name for s in part) for part in (shared,) if part)
     parts = _around(rest, program.shortcut)
-    last = tuple(stage for part in parts for stage in _stages(part, rest, program.result, fission))
+    last = tuple(stage for part in parts for stage in _stages(part, parts, outcome, fission))
     stages = (*first, *last)
     if program.shortcut is None:
         return replace(program, stages=stages, mirrored=len(first))
-    halves = {program.shortcut.room, program.shortcut.result}
-    where = tuple(number for number, names in enumerate(stages) if set(names) <= halves)
-    assert len(where) == 2, "each half of a power is a stage of its own"
+    replaced = {step.name for step in _standing_for(rest, program.shortcut)}
+    where = tuple(number for number, names in enumerate(stages) if set(names) <= replaced)
+    assert {name for number in where for name in stages[number]} == replaced, "what is replaced is in stages of its own"
     return replace(program, stages=stages, mirrored=len(first), shortcut=replace(program.shortcut, stages=where))
 
 
+def _standing_for(steps: tuple[Step, ...], shortcut: Shortcut) -> tuple[Step, ...]:
+    """The steps that a shortcut saves: those that it replaces, and what is made of its source for them alone."""
+    saved = set(shortcut.replaced)
+    for step in reversed(steps):
+        users = {other.name for other in steps if step.name in other.uses()}
+        if step.name != shortcut.source and users and users <= saved and step.uses() <= {shortcut.source}:
+            saved.add(step.name)
+    return tuple(step for step in steps if step.name in saved)
+
+
 def _around(steps: tuple[Step, ...], shortcut: Shortcut | None) -> tuple[tuple[Step, ...], ...]:
-    """The steps before, of and after what a shortcut replaces, which stands together: both halves of a power do."""
+    """The steps before, of and after what a shortcut saves, which stands together: both halves of a power do."""
     if shortcut is None:
         return (steps,) if steps else ()
-    names = [step.name for step in steps]
-    begin, end = names.index(shortcut.room), names.index(shortcut.result) + 1
-    assert end == begin + 2, "the halves of a power stand together"
-    return tuple(part for part in (steps[:begin], steps[begin:end], steps[end:]) if part)
+    saved = _standing_for(steps, shortcut)
+    end = next(i for i, step in enumerate(steps) if step.name == shortcut.result)
+    before = tuple(step for step in steps[:end] if step not in saved)
+    return tuple(part for part in (before, saved, steps[end + 1 :]) if part)
 
 
-def _stages(part: tuple[Step, ...], steps: tuple[Step, ...], result: str, fission: bool) -> tuple[tuple[str, ...], ...]:
-    """The stages of one part of the steps; what the steps after it use is kept."""
-    after = steps[steps.index(part[-1]) + 1 :]
-    needed = {name for step in after for name in step.uses()} | {result}
+def _stages(
+    part: tuple[Step, ...], parts: tuple[tuple[Step, ...], ...], outcome: set[str], fission: bool
+) -> tuple[tuple[str, ...], ...]:
+    """The stages of one part of the steps; what the parts after it use is kept."""
+    after = parts[parts.index(part) + 1 :]
+    needed = {name for later in after for step in later for name in step.uses()} | outcome
     return _cut(part, needed) if fission else (tuple(step.name for step in part),)
 
 
-def cycles(stage: int) -> float:
+def cycles(stage: int, in_view: float = IN_VIEW) -> float:
     """About how many cycles a vector of pixels takes in a loop of that weight.
 
     Operations are issued some three at a time; how long they wait for one another grows with their square.
     """
-    return LOOP + max(stage / ISSUED, stage * stage / IN_VIEW)
+    return LOOP + max(stage / ISSUED, stage * stage / in_view)
 
 
 def weight(step: Step, *, wide: bool = False) -> int:
@@ -97,7 +133,7 @@ def weight(step: Step, *, wide: bool = False) -> int:
     for node in walk(step.value):
         total += 1 if isinstance(node, Cast) else _SLOW.get(type(node), 0)
         if isinstance(node, Call):
-            total += _CALLS.get(node.function, _OTHER_CALL)
+            total += _CALLS.get(node.function) or _WIDE_CALLS.get(node.function, _OTHER_CALL)
     return 2 * total if wide else total
 
 
@@ -133,15 +169,18 @@ def _cut(steps: Sequence[Step], needed: set[str]) -> tuple[tuple[str, ...], ...]
     narrow = any(step.format == "float32" for step in steps)
     weights = [weight(step, wide=narrow and step.format != "float32") for step in steps]
 
+    in_view = IN_VIEW_OF_PAIRS if any(step.format == "pair" for step in steps) else IN_VIEW
+    words = [2 if step.format in WIDE else 1 for step in steps]
+
     def crosses(at: int) -> int:
-        return sum(1 for i, name in enumerate(names[:at]) if last_use[name] >= at)
+        return sum(words[i] for i, name in enumerate(names[:at]) if last_use[name] >= at)
 
     best: list[tuple[float, int]] = [(0.0, 0)]  # cycles of the stages so far, where the last one begins
     for end in range(1, len(steps) + 1):
         options = []
         for begin in range(end):
             carried = CROSSING * crosses(begin) if begin else 0.0
-            options.append((best[begin][0] + carried + cycles(sum(weights[begin:end])), begin))
+            options.append((best[begin][0] + carried + cycles(sum(weights[begin:end]), in_view), begin))
         best.append(min(options))
     stages: list[tuple[str, ...]] = []
     end = len(steps)

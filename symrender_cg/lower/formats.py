@@ -186,9 +186,9 @@ def _in_words(value: sp.Basic, format_of: Callable[[str], Format], target: Forma
             return call("dd_difference", first[0], second[0]), True
         if not second[1]:
             return call(words.add_double, first[0], Negative(second[0])), True
-        if not first[1] and target == "pair":
+        if not first[1]:
             return call(words.add_double, call("dd_neg", second[0]), first[0]), True
-        return call(words.add.replace("add", "sub"), lift(first), second[0]), True
+        return call(words.add.replace("add", "sub"), first[0], second[0]), True
 
     def _called(node: Call) -> tuple[sp.Basic, bool]:
         arguments = node.args[1:]

@@ -11,6 +11,7 @@ freeze          trees of single operations
 convert         operands rounded to their operation, double-double to calls
 bake            frame steps to numbers (only when asked)
 prune, arrange  what nothing uses is left out, sections are brought together
+anchor          a pixel's place in its row, counted from the ends of the hits (float32; narrow products: before sharing)
 cut             a pixel's steps in stages, the first ones the same for x and -x (kernels of one sphere that fill spans)
 """
 
@@ -28,6 +29,7 @@ from symrender_cg.derive import forms
 from symrender_cg.derive.program import ImageProgram
 from symrender_cg.derive.symbols import INPUTS, symbol
 from symrender_cg.lower import passes
+from symrender_cg.lower.anchors import anchor, narrow_products
 from symrender_cg.lower.bake import bake
 from symrender_cg.lower.fission import cut
 from symrender_cg.lower.formats import convert_formats
@@ -44,6 +46,7 @@ FUNCTIONS = {
         "log2": "log2_of_lobe",
         "exp2": "power_of_lobe",
         "whole": "whole_powers_of_lobe",
+        "bounded": "whole_powers_of_square",
     },
     "float32": {
         "power": "powerf",
@@ -58,8 +61,9 @@ FUNCTIONS = {
         "log2": "fast_log2_of_lobef",
         "log2_of_square": "fast_log2_of_squaref",
         "exp2": "fast_power_of_lobef",
+        "large": "fast_powers_of_lobef",
     },
-    "pair": {"power": "power", "cosine": "precise_power_of_cosine"},
+    "pair": {"power": "power", "cosine": "precise_power_of_cosine", "bounded": "whole_powers_of_pair"},
     "coarse": {"power": "coarse_powerf", "cosine": "coarse_power_of_cosinef"},
     "libm": {"power": "libm_power", "cosine": "libm_power_of_cosine"},
     "libmf": {"power": "libm_powerf", "cosine": "libm_power_of_cosinef"},
@@ -93,9 +97,12 @@ def lower(
         return cut(program, fission=variant.passes.fission, symmetry=variant.passes.symmetry)
 
     staged = variant.staged and not plan.needs("front_test")
-    halves = staged and variant.passes.halves
-    by_squaring = halves and variant.passes.fission and variant.passes.whole and numbers is None
-    whole = FUNCTIONS[variant.powers].get("whole") if by_squaring else None
+    anchored = staged and variant.passes.anchors and variant.shading == "float32"
+    halves = staged and variant.passes.halves and variant.settles is None
+    by_squaring = staged and variant.passes.fission and variant.passes.whole and numbers is None
+    by_squaring = by_squaring and (halves or variant.settles is not None)
+    whole = FUNCTIONS[variant.powers].get("bounded" if variant.settles else "whole") if by_squaring else None
+    large = FUNCTIONS[variant.powers].get("large") if by_squaring else None
     sequence: list[tuple[str, Callable[[KernelProgram], KernelProgram]]] = [
         ("assign formats", lambda program: passes.assign_formats(program, variant)),
         ("scale lengths", passes.scale_lengths if variant.exact else _raw_inputs),
@@ -103,8 +110,10 @@ def lower(
         *((("whole exponent", baked_exponent),) if exponent is not None else ()),
         ("lower powers", lambda program: passes.lower_powers(program, FUNCTIONS[variant.powers], halves=halves)),
         *((("whole exponent", lambda program: passes.shortcut_power(program, whole)),) if whole else ()),
+        *((("large exponent", lambda program: passes.shortcut_narrow_lobe(program, large)),) if large else ()),
         ("place", passes.place),
         ("hoist", passes.hoist),
+        *((("narrow products", narrow_products),) if anchored else ()),
         *((("gather mirrored", gather_mirrored),) if staged and variant.passes.symmetry else ()),
         ("share", passes.share),
         ("place shares", passes.place),
@@ -114,6 +123,7 @@ def lower(
         *((("bake", lambda program: bake(program, numbers)),) if numbers is not None else ()),
         ("prune", passes.prune),
         ("arrange", passes.arrange),
+        *((("anchor", anchor),) if anchored else ()),
         *((("cut", cut_in_stages),) if staged else ()),
     ]
     start = time.perf_counter()
@@ -134,13 +144,16 @@ def choose_forms(image: ImageProgram, plan: Plan, variant: Variant) -> KernelPro
     chosen = tuple(entry for entry in entries if entry.fits(image, off_axis=off_axis, front_test=front_test))
     ends = next((entry.ends for entry in chosen if entry.ends), None) if variant.fills else None
     wanted = ("extent_x", "extent_y") if variant.settles and ends else ()
+    judged: tuple[str, ...] = ("facing2", "d_dot_d", "n_dot_l", "w_dot_mirror") if variant.settles else ()
     sight = ("d_dot_d",) if variant.exact else ()  # how sure a hit is, is in |D|^2
     program = forms.apply(image, chosen, keep=(*sight, *wanted))
     steps = tuple(Step(d.name, d.value, d.section, d.meaning, d.source) for d in program.definitions)
     order = [row.name for row in INPUTS]
     inputs = tuple(sorted((name for name in program.inputs if name not in ("x", "y")), key=order.index))
     name = f"{plan.name}_{variant.name}"
-    return KernelProgram(name, steps, program.guard, ends, program.value, inputs, program.background, wanted)
+    held = {step.name for step in steps}
+    judged = tuple(entry for entry in judged if entry in held)
+    return KernelProgram(name, steps, program.guard, ends, program.value, inputs, program.background, wanted, judged)
 
 
 def _raw_inputs(program: KernelProgram) -> KernelProgram:

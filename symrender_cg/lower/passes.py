@@ -168,17 +168,38 @@ def shortcut_power(program: KernelProgram, function: str) -> KernelProgram:
 
     highlight = power_of_lobe(highlight_log2, n)  ->  also half_exponent = half_of_whole(n), once a frame, and where
                                                       it is not 0: whole_powers_of_lobe(sin2, ..., half_exponent, ...)
+    highlight = power_of_cosine(cos2, sin2, n)    ->  the same from cos2: whole_powers_of_square(cos2, ...)
     """
-    if "highlight_log2" not in program:
+    if "highlight" not in program:
         return program
-    source = program["highlight_log2"].value.args[-1].name
-    section = program["highlight"].section
-    exponent = program["highlight"].value.args[-1]
+    halves = "highlight_log2" in program
+    source = program["highlight_log2"].value.args[-1].name if halves else "cos2"
     meaning = "n / 2 where n is an even whole number, else 0"
-    half = Step("half_exponent", call("half_of_whole", exponent), section, meaning, format="int")
-    steps = [half, *program.steps]
-    first = Shortcut(function, source, "highlight_log2", "highlight", half.name)
-    return replace(program.with_steps(steps), wanted=(*program.wanted, half.name), shortcut=first)
+    room = "highlight_log2" if halves else ""
+    return _with_shortcut(program, function, source, room, "half_of_whole", meaning, "int")
+
+
+def shortcut_narrow_lobe(program: KernelProgram, function: str) -> KernelProgram:
+    """A large exponent that is an argument: its lobe is narrow, and a short polynomial does for it. Exact where the
+    power is 0 or 1, else within the bound of `function`.
+
+    highlight = fast_power_of_lobef(highlight_log2, n)  ->  also half_exponent = half_of_large(n), once a frame, and
+                                                            where it is not 0: fast_powers_of_lobef(cos2, ...)
+    """
+    if "highlight_log2" not in program or program["highlight_log2"].value.args[1:] != (symbol("cos2"),):
+        return program
+    meaning = "n / 2 where n is large, else 0"
+    return _with_shortcut(program, function, "cos2", "highlight_log2", "half_of_large", meaning, "float32")
+
+
+def _with_shortcut(
+    program: KernelProgram, function: str, source: str, room: str, half_of: str, meaning: str, form: Format
+) -> KernelProgram:
+    last = program["highlight"]
+    half = Step("half_exponent", call(half_of, last.value.args[-1]), last.section, meaning, format=form)
+    found = Shortcut(function, source, room, last.name, half.name)
+    steps = (half, *program.steps)
+    return replace(program.with_steps(steps), wanted=(*program.wanted, half.name), shortcut=found)
 
 
 def _product_chain(step: Step, base: sp.Expr, exponent: int) -> tuple[list[Step], sp.Expr]:
@@ -215,8 +236,8 @@ def share(program: KernelProgram) -> KernelProgram:
         where = [i for i, step in enumerate(program.steps) if step.format == form]
         fresh = (symbol(f"share_{k}") for k in range(counter + 1, 10_000))
         shared, reduced = sp.cse([values[i] for i in where], symbols=fresh, order="canonical")
-        shared, reduced = _without_reciprocals(shared, reduced)
         counter += len(shared)
+        shared, reduced = _without_reciprocals(shared, reduced)
         for i, value in zip(where, reduced, strict=True):
             values[i] = value
         pending = dict(shared)

@@ -14,6 +14,7 @@ from symrender_cg.lower.nodes import Node, count
 
 Rate = Literal["frame", "sphere", "row", "pixel"]
 Format = Literal["int", "float32", "float64", "double_double", "pair", "range", "ball"]
+Anchor = Literal["first", "middle", "last"]
 RATES: tuple[Rate, ...] = ("frame", "sphere", "row", "pixel")
 """From the slowest to the fastest. Kernels of one sphere have no step at the rate of the sphere: it is the frame's."""
 
@@ -42,7 +43,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Shortcut:
-    """function(source[], room[], result[], when, count) in place of the stages `stages`, where `when` is not 0."""
+    """function(source[], room[], result[], when, count) in place of the stages `stages`, where `when` is not 0.
+
+    `room` is the step before the result, or "" where there is none: then the source is used up.
+    """
 
     function: str
     source: str
@@ -50,6 +54,16 @@ class Shortcut:
     result: str
     when: str
     stages: tuple[int, ...] = ()
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """The steps whose arrays it works on."""
+        return tuple(name for name in (self.source, self.room, self.result) if name)
+
+    @property
+    def replaced(self) -> tuple[str, ...]:
+        """The steps that it stands for."""
+        return tuple(name for name in (self.room, self.result) if name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +75,10 @@ class KernelProgram:
     result   the name of the intensity where the ray hits
     inputs   names of the numbers that the kernel is called with, in the order of its scene structure
     wanted   other names that are needed of it
+    judged   names of a pixel's quantities that say how far its value may be off: their high words are kept for that
     rates    rates of its symbols that change within a frame, by the inputs' names without `scene_`
     narrow   inputs that come in the format of the shading, from an array that another part wrote
+    anchors  float32 numbers of a pixel that move one for one with x, and the hit that each is counted from: anchors.py
     stages   names of the steps of a pixel in the stages of fission.py, or none: then they are one piece
     mirrored how many of the stages, from the first on, are the same for the pixels at x and -x
     shortcut what computes a step for a whole block where a number of the frame is not 0, in place of some stages
@@ -76,8 +92,10 @@ class KernelProgram:
     inputs: tuple[str, ...]
     background: str = "background"
     wanted: tuple[str, ...] = ()
+    judged: tuple[str, ...] = ()
     rates: tuple[tuple[str, Rate], ...] = (("y", "row"), ("x", "pixel"))
     narrow: frozenset[str] = frozenset()
+    anchors: tuple[tuple[str, Anchor], ...] = ()
     stages: tuple[tuple[str, ...], ...] = ()
     mirrored: int = 0
     shortcut: Shortcut | None = None

@@ -36,7 +36,7 @@ from symrender_cg.lower.nodes import (
     number,
 )
 from symrender_cg.lower.passes import arrange
-from symrender_cg.lower.program import KernelProgram, Step
+from symrender_cg.lower.program import KernelProgram, Shortcut, Step
 
 _NONE, _ONE = number(0), number(1)
 _INFINITE = symbol("INFINITY")
@@ -49,6 +49,7 @@ FACTS: Mapping[str, tuple[sp.Basic, sp.Basic]] = {
     "to_right": (_NONE, _INFINITE),
     "facing2": (_SURE_HIT, symbol("farthest2")),
     **{f"n_{axis}": (number(-1), _ONE) for axis in "xyz"},
+    "n_dot_lamp": (Negative(symbol("lamp_length")), symbol("lamp_length")),
     "w2": (symbol("light_gap2"), _INFINITE),
     "n_dot_l": (number(-1), _ONE),
     "cos2": (symbol("least_cos2"), _ONE),
@@ -56,8 +57,8 @@ FACTS: Mapping[str, tuple[sp.Basic, sp.Basic]] = {
 }
 """What is known of a pixel that hits: |n| = 1, facing <= |D|, |w| >= ||lamp| - 1|, and a cosine is one.
 
-`farthest2`, `light_gap2` and `least_cos2` are numbers of the frame: the largest |D|^2, the square of that distance,
-and how small a cosine may be before the pixel asks for more (0, but for n < 1).
+`farthest2`, `lamp_length`, `light_gap2` and `least_cos2` are numbers of the frame: the largest |D|^2, the largest
+|lamp|, the least |w|^2, and how small a cosine may be before the pixel asks for more (0, but for n < 1).
 """
 
 ROOT_FACTS: Mapping[str, sp.Basic] = {"reach": symbol("least_reach2"), "row_half": symbol("least_half2")}
@@ -89,7 +90,7 @@ def to_ranges(program: KernelProgram, results: tuple[str, ...]) -> tuple[Step, .
         if step.name in exact:
             steps.append(replace(step, rate="frame", meaning="", source=""))
             continue
-        value = _Ranges(exact, step).of(step.value)
+        value = _Ranges(exact, step, program.shortcut).of(step.value)
         if step.name in ROOT_FACTS:
             root, form, square = value.args
             value = call("range_root", form, call("range_within", square, ROOT_FACTS[step.name], _INFINITE))
@@ -119,7 +120,11 @@ def _facts_after(program: KernelProgram, step: Step) -> list[Step]:
         return [Step("least_half2", least, step.section, "of a row with hits that are sure", format="float64")]
     if step.name == "lamp_z":
         gap = call("range_light_gap2", *(symbol(f"lamp_{axis}") for axis in "xyz"))
-        return [Step("light_gap2", gap, step.section, "the least |w|^2: (|lamp| - 1)^2", format="float64")]
+        found = [Step("light_gap2", gap, step.section, "the least |w|^2: (|lamp| - 1)^2", format="float64")]
+        if "n_dot_lamp" in program:
+            length = call("range_length", *(symbol(f"lamp_{axis}") for axis in "xyz"))
+            found.append(Step("lamp_length", length, step.section, "the largest |lamp|", format="float64"))
+        return found
     if step.name == "d_dot_d":
         most = call("range_size", symbol("d_dot_d"))
         return [Step("farthest2", most, step.section, "the largest |D|^2", format="float64")]
@@ -129,6 +134,7 @@ def _facts_after(program: KernelProgram, step: Step) -> list[Step]:
 def _needed(program: KernelProgram, results: tuple[str, ...]) -> set[str]:
     """Names that lead to the results, and those that facts about them speak of."""
     needed = {*results, "d_dot_d", *(f"lamp_{axis}" for axis in "xyz")}
+    needed |= {program.shortcut.when} if program.shortcut else set()
     for step in reversed(program.steps):
         if step.name in needed:
             needed |= step.uses()
@@ -148,8 +154,9 @@ def _is_exact(step: Step, exact: Mapping[str, sp.Basic]) -> bool:
 class _Ranges:
     """The expressions of one step in calls of range.h."""
 
-    def __init__(self, exact: Mapping[str, sp.Basic], step: Step) -> None:
+    def __init__(self, exact: Mapping[str, sp.Basic], step: Step, shortcut: Shortcut | None) -> None:
         self.exact = exact
+        self.shortcut = shortcut
         self.format = symbol("FLOAT64" if step.format == "float64" else "DOUBLE_DOUBLE")
 
     def of(self, node: sp.Basic) -> sp.Basic:
@@ -225,7 +232,10 @@ class _Ranges:
             (_NONE, symbol("POWER_ERROR")) if plain else (symbol("PRECISE_POWER_ERROR"), symbol("PRECISE_POWER_FLOOR"))
         )
         form = symbol("FLOAT64" if plain else "PAIR")
-        return call("range_power_of_cosine", form, *(self.of(argument) for argument in arguments), *own)
+        told = [self.of(argument) for argument in arguments]
+        if self.shortcut is not None:
+            return call("range_lobe", form, *told, symbol(self.shortcut.when), *own)
+        return call("range_power_of_cosine", form, *told, *own)
 
 
 def _in_order(node: sp.Basic) -> tuple[sp.Basic, sp.Basic] | None:

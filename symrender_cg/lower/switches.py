@@ -16,7 +16,9 @@ class Passes:
     symmetry   what the pixels at x and -x share is computed once (symmetry.py); the first part of each sum is even
     fission    the steps of a pixel in short loops over a block (fission.py)
     halves     a power in two steps, its logarithm and 2^y, so that fission may cut between them
-    whole      an even whole exponent that is an argument: by squaring instead, a block at a time (lobe_power.h)
+    whole      an exponent that is an argument, even and whole: by squaring instead, a block at a time (lobe_power.h);
+               for `fast` one of 32 or more: by a shorter polynomial (fast_power.h)
+    anchors    where a pixel lies in its row: float64 at the ends of its hits, counted in float32 between (anchors.py)
     prefetch   the next row is begun while this one is computed: its numbers, and its memory is asked for (block.h)
     """
 
@@ -24,6 +26,7 @@ class Passes:
     fission: bool = True
     halves: bool = True
     whole: bool = True
+    anchors: bool = True
     prefetch: bool = True
 
     @property

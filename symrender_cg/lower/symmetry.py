@@ -6,11 +6,13 @@ here: a decision for a kind of scene. Where the sphere lies off the axis nothing
 
 A step is even where it is the same for x and -x, and odd where it is the same up to its sign. After freezing this is a
 statement on bits: rounding to nearest commutes with a change of sign, sums and products commute, so two trees of
-operations that differ by these laws alone give the same number, up to the sign of a zero.
+operations that differ by these laws alone give the same number, up to the sign of a zero. Products of pairs commute in
+their high words; their low words may differ by what a pair's bound counts.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
@@ -142,6 +144,16 @@ def parities(program: KernelProgram) -> dict[str, Parity]:
     return found
 
 
+_SUMS: Mapping[str, tuple[str, bool]] = {
+    **{name: (name, False) for name in ("dd_sum", "dd_add", "pair_add", "dd_add_double", "pair_add_double")},
+    "dd_difference": ("dd_sum", True),
+    "dd_sub": ("dd_add", True),
+    "pair_sub": ("pair_add", True),
+}
+_PRODUCTS = {"dd_product", "dd_mul", "dd_mul_double", "pair_mul", "pair_mul_double"}
+_ODD = {"dd_from", "dd_scale", "dd_div", "pair_div", "pair_inverse", "pair_normalised"}
+"""What the functions of wide numbers are, as to signs and order."""
+
 _Signed = tuple[int, int]
 """A number of a value up to its sign, and the sign."""
 
@@ -167,8 +179,10 @@ class _Numbers:
             value = node.value
             return self._number("number", node.format, abs(value)), -1 if value < 0 else 1
         arguments = [self.of(a, known) for a in node.args if not isinstance(a, Str)]
-        if isinstance(node, Negative) or (isinstance(node, Call) and node.function == "dd_neg"):
+        if isinstance(node, Negative):
             return _negated(arguments[0])
+        if isinstance(node, Call):
+            return self._called(node.function, arguments)
         if isinstance(node, Cast | Part):
             (inner, sign) = arguments[0]
             return self._number(type(node), node.args[0].name, inner), sign
@@ -176,15 +190,28 @@ class _Numbers:
             a, b = arguments
             first, second = sorted((a, _negated(b) if isinstance(node, Difference) else b))
             return self._number(Sum, first[0], second[0], first[1] * second[1]), first[1]
-        if isinstance(node, Call) and node.function == "square":
-            return self._number(Product, arguments[0][0], arguments[0][0]), 1
         if isinstance(node, Product):
             return self._number(Product, *sorted(a[0] for a in arguments)), arguments[0][1] * arguments[1][1]
         if isinstance(node, Quotient):
             return self._number(Quotient, *(a[0] for a in arguments)), arguments[0][1] * arguments[1][1]
-        function = node.function if isinstance(node, Call) else ""
         assert isinstance(node, Node | Root), f"{node} is not frozen"
-        return self._number(type(node), function, *arguments), 1
+        return self._number(type(node), *arguments), 1
+
+    def _called(self, function: str, arguments: list[_Signed]) -> _Signed:
+        if function == "dd_neg":
+            return _negated(arguments[0])
+        if function in ("square", "pair_square"):
+            return self._number(Product, function, arguments[0][0], arguments[0][0]), 1
+        if function in _SUMS:
+            added, minus = _SUMS[function]
+            first, second = sorted((arguments[0], _negated(arguments[1]) if minus else arguments[1]))
+            return self._number(Sum, added, first[0], second[0], first[1] * second[1]), first[1]
+        if function in _PRODUCTS:
+            sign = math.prod(a[1] for a in arguments)
+            return self._number(Product, function, *sorted(a[0] for a in arguments)), sign
+        if function in _ODD:
+            return self._number(Call, function, *(a[0] for a in arguments)), math.prod(a[1] for a in arguments)
+        return self._number(Call, function, *arguments), 1
 
     def _number(self, *key: object) -> int:
         return self._known.setdefault(key, len(self._known))

@@ -27,6 +27,15 @@ _STABLE_FORMS = (
     "gained",
 )
 
+_INNER_FORMS = (
+    *_STABLE_FORMS,
+    "centred_foot_dot_lamp",
+    "off_axis_foot_dot_lamp",
+    "inner_products",
+    "complement",
+)
+"""For kernels that bound their own error: what cancels is counted."""
+
 MOST_ROUNDOFFS = 9.1
 """Unit roundoffs, 2^-53, that keep an error of `double` below 1e-15."""
 
@@ -36,6 +45,9 @@ _DOUBLE_DOUBLE = frozenset(
         *("distance", "row_gap", "row_disc", "row_mid", "row_half", "x_left", "x_right", "power"),
     }
 )
+
+_FACTORS = frozenset({"depth2", "depth_focal"})
+"""Constants of a frame that the mirrored ray is a multiple of: rounded once."""
 
 _EXACT_NUMBERS = frozenset({"focal", "plane_unit", "zero_power", "extent_x", "extent_y"})
 """Quantities that a float64 holds exactly, or that need be known but roughly."""
@@ -115,8 +127,8 @@ class Variant:
 
     @property
     def staged(self) -> bool:
-        """Whether its kernels of one sphere run in stages: where spans are filled and no bound is carried along."""
-        return self.passes.staged and self.exact and self.fills and self.settles is None
+        """Whether its kernels of one sphere run in stages: where spans are filled."""
+        return self.passes.staged and self.exact and self.fills
 
     @property
     def key(self) -> str:
@@ -184,9 +196,9 @@ VARIANTS: tuple[Variant, ...] = (
         "at most 1e-15 max(1, value) off where no light is within 1e-3 R of a surface and n <= 1000; another kernel "
         "draws what this one may not; no overflow; hit or miss never wrong",
         "float64",
-        _STABLE_FORMS,
+        (*_STABLE_FORMS, "middle_facing", "mirrored_foot"),
         exact=True,
-        double_double=_DOUBLE_DOUBLE,
+        double_double=_DOUBLE_DOUBLE | _FACTORS,
         per_pixel_exact=_PER_PIXEL,
     ),
 )
@@ -196,7 +208,7 @@ LEVELS: tuple[Variant, ...] = (
         "stable",
         "at most 4 ulp, for every valid scene: pixels whose own bound does not show that are reported",
         "pair",
-        (*_STABLE_FORMS, "complement"),
+        _INNER_FORMS,
         exact=True,
         float64=_EXACT_NUMBERS,
         double_double=_DOUBLE_DOUBLE | _WIDE_LIGHT | _RENORMALISED,
@@ -207,7 +219,7 @@ LEVELS: tuple[Variant, ...] = (
         "certified_float64",
         "the float64 nearest to the true value; pixels whose own bound does not show that are reported",
         "pair",
-        (*_STABLE_FORMS, "complement"),
+        _INNER_FORMS,
         exact=True,
         float64=_EXACT_NUMBERS,
         double_double=_DOUBLE_DOUBLE | _WIDE_LIGHT | _RENORMALISED,
@@ -218,7 +230,7 @@ LEVELS: tuple[Variant, ...] = (
             f"certified_{target}",
             f"{words}; pixels whose own bound does not show that are reported",
             "float64",
-            (*_STABLE_FORMS, "complement") if target == "uint8" else _STABLE_FORMS,
+            _INNER_FORMS,
             exact=True,
             double_double=_DOUBLE_DOUBLE,
             per_pixel_exact=_PER_PIXEL,

@@ -22,8 +22,9 @@ LARGEST_RATIO_AT_EYE = 2.0**30
 LARGEST_RATIO_AT_EYE_SINGLE = 2.0**15
 """The same in float32: the rays to such a sphere reach as many times beyond the distance of the image plane."""
 
-LARGEST_RATIO_SINGLE = 2.0**60
-"""The same for kernels that shade in float32: its square is still a float32."""
+LARGEST_RATIO_SINGLE = 2.0**50
+"""The same for kernels that shade in float32: products of distances on the image plane, down to its inverse square and
+2^-25 of it, are still float32."""
 
 LARGEST_VIEW = 2.0**100
 """Largest ratio of half_height to the distance of the eye; 57 already see 178 degrees, an eye at a sphere needs 1e8."""

@@ -95,11 +95,14 @@ def _facing(measures: Measures, mirrored: Truths) -> Truths:
     return result
 
 
-def caps_apart(measures: Measures, light: int, chosen: Indices, from_eye: Truths) -> Truths:
-    """(n,): psi > phi_E + phi_L for the chosen spheres, phi_E = pi where they are not seen `from_eye` alone."""
+def caps_apart(measures: Measures, light: int | Indices, chosen: Indices, from_eye: Truths) -> Truths:
+    """(n,): psi > phi_E + phi_L for the chosen spheres, phi_E = pi where they are not seen `from_eye` alone.
+
+    light: one for all, or one a sphere, all of one kind.
+    """
     to_eye, radius = -measures.m[chosen], measures.radius[chosen]
     visible = cap_above(measures.distance[chosen], radius)
-    if measures.directional[light]:
+    if np.all(measures.directional[light]):
         to_light = np.broadcast_to(measures.at[light], to_eye.shape)
         lit: Floats = np.full(len(chosen), np.pi / 2)
         inside = np.zeros(len(chosen), dtype=bool)

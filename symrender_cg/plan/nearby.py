@@ -26,6 +26,9 @@ _CELL_BITS: Final = 20
 _BATCH: Final = 1 << 21
 """Pairs looked at in one go: bounds the memory."""
 
+_FEW: Final = 1 << 14
+"""So many pairs are looked at one by one: cells cost more."""
+
 _ROUNDING: Final = 2.0**-40
 """Reaches grow by this much of themselves and of the largest coordinate: more than cells and distances are off."""
 
@@ -40,6 +43,10 @@ def near_pairs(p: Floats, reach_p: Floats, q: Floats, reach_q: Floats) -> tuple[
     extent = float(max(p.max(), q.max()))
     slack = _ROUNDING * extent
     reach_p, reach_q = reach_p * (1.0 + _ROUNDING) + slack, reach_q * (1.0 + _ROUNDING) + slack
+    if len(p) * len(q) <= _FEW:
+        apart, reach = p[:, np.newaxis] - q, reach_p[:, np.newaxis] + reach_q
+        i, j = np.nonzero(np.einsum("nki,nki->nk", apart, apart) <= reach * reach)
+        return i, j
     level_p, level_q = _levels(np.concatenate((reach_p, reach_q)), len(p))
     found = [(nothing, nothing)]
     for level in np.unique(np.concatenate((level_p, level_q))):

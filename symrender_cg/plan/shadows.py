@@ -67,7 +67,7 @@ def _on_spheres(measures: Measures, light: int, chosen: Indices, leaking: Truths
         if height[light] > error[light]:
             useful = useful[~measures.beyond_plane]
     if measures.directional[light]:
-        place, reach = _across(measures, light), measures.radius
+        place, reach = across(measures, light), measures.radius
     else:
         away = measures.center - measures.at[light]
         distance = norm(away)
@@ -86,7 +86,7 @@ def _on_spheres(measures: Measures, light: int, chosen: Indices, leaking: Truths
     return a[~missed], b[~missed]
 
 
-def _across(measures: Measures, light: int) -> Floats:
+def across(measures: Measures, light: int) -> Floats:
     """(N, 3): the centres seen along a directional light, two coordinates across it and a 0."""
     towards = measures.at[light]
     first = np.zeros(3)
@@ -97,15 +97,18 @@ def _across(measures: Measures, light: int) -> Floats:
     return np.asarray(measures.center @ basis.T)
 
 
-def misses_sphere(measures: Measures, light: int, a: Indices, b: Indices, leaking: Truths) -> Truths:
-    """(n,): blocker b provably darkens no point of sphere a; `leaking` (receivers,): unlit points matter too."""
+def misses_sphere(measures: Measures, light: int | Indices, a: Indices, b: Indices, leaking: Truths) -> Truths:
+    """(n,): blocker b provably darkens no point of sphere a; `leaking` (receivers,): unlit points matter too.
+
+    light: one for all pairs, or one a pair, all of one kind.
+    """
     center, radius = measures.center, measures.radius
     between = center[b] - center[a]
     gap = norm(between)
     reach = radius[a] + radius[b]
     apart = gap > reach * (1.0 + LENGTH)
     contained = ~leaking[a] & (gap + radius[b] < radius[a] * (1.0 - LENGTH))
-    if measures.directional[light]:
+    if np.all(measures.directional[light]):
         towards = np.broadcast_to(measures.at[light], between.shape)
         aside, behind = norm(cross(between, towards)), dot(between, towards) < 0.0
         error = LENGTH * (gap + reach)

@@ -36,7 +36,7 @@ from symrender_cg.plan.measures import (
 from symrender_cg.plan.nearby import near_pairs
 from symrender_cg.plan.order import deeper, seen_aside
 
-_HIDERS: Final = 64
+HIDERS: Final = 64
 """So many of the widest cones are tried as what hides others."""
 
 
@@ -94,7 +94,7 @@ def hidden(measures: Measures, chosen: Indices) -> Truths:
     m, d, radius = measures.m[chosen], measures.distance[chosen], measures.radius[chosen]
     alpha, beta = cone_below(d, radius), cone_above(d, radius)
     result = np.zeros(len(chosen), dtype=bool)
-    for hider in np.argsort(-alpha, kind="stable")[:_HIDERS]:
+    for hider in np.argsort(-alpha, kind="stable")[:HIDERS]:
         narrower = np.flatnonzero((beta < alpha[hider]) & ~result)
         gamma = angle(np.broadcast_to(m[hider], (len(narrower), 3)), m[narrower])
         between = norm(measures.center[chosen[narrower]] - measures.center[chosen[hider]])

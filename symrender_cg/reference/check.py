@@ -37,7 +37,7 @@ from msgspec import structs
 from symrender_cg.lower.variants import ACCURACIES, variant
 from symrender_cg.pipeline import draw, settling_kernel
 from symrender_cg.plan.plan import plan
-from symrender_cg.reference import compare, oracle, points
+from symrender_cg.reference import camera_numbers, compare, decisions, hard_places, oracle, points
 from symrender_cg.reference.check_rows import FAST_SHININESS, STATED_ULP, Report, Row
 from symrender_cg.reference.per_pixel import evaluate_per_pixel
 from symrender_cg.reference.points import Points
@@ -126,9 +126,9 @@ def check(
     levels = [_level(frame, accuracy, portable) for accuracy in accuracies or ACCURACIES]
     sets = {f"image {width}x{height}": points.whole_image(frame, width, height)}
     if count:
-        sets["near silhouette"] = points.near_silhouette(frame, count, seed)
-        sets["near terminator"] = points.near_terminator(frame, count, seed)
-        sets["near highlight"] = points.near_highlight(frame, count, seed)
+        sets["near silhouette"] = hard_places.near_silhouette(frame, count, seed)
+        sets["near terminator"] = hard_places.near_terminator(frame, count, seed)
+        sets["near highlight"] = hard_places.near_highlight(frame, count, seed)
     rows = []
     sampled: dict[str, int] = {}
     for where, (x, y) in sets.items():
@@ -202,13 +202,13 @@ def _in_doubt(
     A rounding is u R (1 + 1 / (4 d)) at the sphere's depth, seen on the image plane.
     """
     doubtful = np.zeros(values.shape, dtype=np.bool_)
-    numbers = points.frame_numbers(frame)
+    numbers = camera_numbers.frame_numbers(frame)
     if bound is None or not numbers.gate_specular:
         return doubtful
     eye, depth = numbers.eye, numbers.eye - numbers.center[2]
     distance = abs(math.dist(numbers.light, numbers.center) / numbers.radius - 1.0)
     step = DOUBT * UNIT_ROUNDOFF[accuracy] * numbers.radius * (1.0 + 0.25 / distance) * eye / depth
-    lit = points.exact_lit_test(numbers)
+    lit = decisions.exact_lit_test(numbers)
     with np.errstate(invalid="ignore", over="ignore"):
         missed = np.abs((values - answers.value) - answers.residual) > bound
     for index in np.flatnonzero(missed & answers.hit):

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from symrender_cg.reference.points import FloatArray, FrameNumbers, as_points, frame_numbers, pixel_centres
+from symrender_cg.reference.camera_numbers import FrameNumbers, frame_numbers
+from symrender_cg.reference.points import FloatArray, as_points, pixel_centres
 from symrender_cg.scene import Scene
 
 

@@ -20,6 +20,7 @@ from symrender_cg.plan.plan import Plan
 from symrender_cg.run.levels import MOST_SHININESS
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.run.parameters import Path
+from symrender_cg.run.steep import least_roundoffs, roundoffs
 from symrender_cg.scene import Gradient, PointLight, Scene, Sphere
 from symrender_cg.scene.camera_frame import is_in_frame
 from symrender_cg.scene.framing import framed_half_height
@@ -103,12 +104,19 @@ def _unlike(scene: Scene) -> tuple[object, ...]:
 
 
 def rows_alike(
-    scene: Scene, found: Plan, inputs: Mapping[str, Floats], accuracy: str, order: tuple[str, ...]
+    scene: Scene,
+    found: Plan,
+    inputs: Mapping[str, Floats],
+    accuracy: str,
+    order: tuple[str, ...],
+    *,
+    handed: bool = False,
 ) -> tuple[Floats, Floats]:
     """(numbers, half_heights) of the first sets that have the kernel of the scene, which is that of the first set.
 
     inputs: columns of the sets, the scene's own first. order: the kernel's inputs. numbers has shape (sets, inputs);
     half_heights those of the frames. At least one set, for the scene itself.
+    handed: `double` hands the scene over, see symrender_cg.run.levels.hands_over.
     """
     frame = found.scene
     numbers = numbers_of(frame)
@@ -124,8 +132,9 @@ def rows_alike(
     every = {name: np.broadcast_to(np.float64(value), count) for name, value in numbers.items()}
     half_heights = np.full(count, half_height)
     if count > 1:
+        assert material is not None, "there is one sphere"
         every |= {name: column[:count] for name, column in inputs.items()}
-        sure = _surely(every, numbers, accuracy, gated=found.scene.spheres[0].material.gate_specular)
+        sure = _surely(every, numbers, accuracy, gated=material.gate_specular, handed=handed)
         sure[0] = True
         count = int(np.argmin(sure)) if not sure.all() else count
         if scene.camera.half_height is None and not {"radius", "center_x", "center_y", "center_z"}.isdisjoint(inputs):
@@ -136,7 +145,9 @@ def rows_alike(
     return np.stack([every[name][:count] for name in order], axis=1), half_heights[:count]
 
 
-def _surely(every: Mapping[str, Floats], first: Mapping[str, float], accuracy: str, *, gated: bool) -> Bools:
+def _surely(
+    every: Mapping[str, Floats], first: Mapping[str, float], accuracy: str, *, gated: bool, handed: bool
+) -> Bools:
     """Which sets have a scene, a plan of the same effects as the first, and the same level's kernel."""
     center, light = ([every[f"{what}_{axis}"] for axis in "xyz"] for what in ("center", "light"))
     radius, shininess = every["radius"], every["shininess"]
@@ -159,22 +170,11 @@ def _surely(every: Mapping[str, Floats], first: Mapping[str, float], accuracy: s
         sure &= ((specular != 0.0) & (intensity != 0.0)) == (first["k_specular"] != 0.0 and lit)
         sure &= (shininess <= MOST_SHININESS) == (first["shininess"] <= MOST_SHININESS)
         if accuracy == "double":
-            if gated:
-                sure &= specular == 0.0
-            sure &= (specular == 0.0) | (shininess == 0.0) | (shininess >= 1.0)
-            sure &= _roundoffs(every, center, light) <= (1.0 - ROOM) * MOST_ROUNDOFFS
+            signs = (specular > 0.0) & (gated | ((shininess > 0.0) & (shininess < 1.0)))
+            above = least_roundoffs(every) >= (1.0 + ROOM) * MOST_ROUNDOFFS
+            below = roundoffs(every) <= (1.0 - ROOM) * MOST_ROUNDOFFS
+            sure &= (signs | above) if handed else (~signs & below)
     return np.asarray(sure, dtype=np.bool_)
-
-
-def _roundoffs(every: Mapping[str, Floats], center: list[Floats], light: list[Floats]) -> Floats:
-    """The bound by which symrender_cg.run.levels.hands_over decides."""
-    square = sum((a - b) * (a - b) for a, b in zip(light, center, strict=True))
-    distance = np.abs(np.sqrt(square) / every["radius"] - 1.0)
-    diffuse = 3.0 * every["k_diffuse"] / distance
-    specular = every["k_specular"] * (1.0 + 2.9 * np.sqrt(every["shininess"])) * (1.0 + 0.25 / distance)
-    brightest = every["k_ambient"] + every["light_intensity"] * (every["k_diffuse"] + every["k_specular"])
-    bound = every["light_intensity"] * (diffuse + specular) + 2.0 * np.maximum(0.0, brightest - 1.3)
-    return np.asarray(np.where(distance > ROOM, bound, np.inf), dtype=np.float64)
 
 
 def _framed(every: Mapping[str, Floats], count: int) -> Floats:

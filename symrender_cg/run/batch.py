@@ -1,16 +1,18 @@
 """`render_batch`: many sets of parameters -> one array of images, without a return to Python between them.
 
 In: a scene, what changes from set to set, a size. Out: an array (count, height, width), or (count, height, width, 3).
-Sets in a row that one kernel of one sphere draws are one call of it, whose rows the threads share; a set that calls for
-another kernel, or for stages that prove its values, is drawn by itself. Every image has the bits of render_image.
-Never here: a plan, or a check of a scene's numbers.
+Sets are made ready in chunks of bounded memory and drawn lot by lot: a lot is one call of one kernel, whose rows the
+threads share. Every image has the bits of render_image.
+Never here: a plan, a choice of kernels, or a check of a scene's numbers.
 """
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from threading import Lock, get_ident
 from typing import Any
@@ -19,20 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.lower.variants import variant
-from symrender_cg.pipeline import pixel_size
-from symrender_cg.run.alike import inputs_of, inputs_of_scenes, rows_alike
-from symrender_cg.run.certify import Job, settle_image
-from symrender_cg.run.kernel import GRID, Kernel
-from symrender_cg.run.numbers import numbers_of
-from symrender_cg.run.parameters import Parameters, Sets, parameter_sets
-from symrender_cg.run.ready import Ready, checked_out, make_ready, rows_are_contiguous, shape_of, side
-from symrender_cg.run.threads import over_rows, thread_count
+from symrender_cg.run.certify import Job
+from symrender_cg.run.chunks import Asked, Waiting, make_chunk
+from symrender_cg.run.lots import Rows, Target
+from symrender_cg.run.parameters import Parameters, parameter_sets
+from symrender_cg.run.ready import checked_out, shape_of, side
+from symrender_cg.run.threads import thread_count
 from symrender_cg.scene import Scene, load_scene
 
 Progress = Callable[[int, int], object]
-
-MOST_SETS = 4096
-"""Sets whose numbers are made ready before they are drawn."""
 
 SECONDS_BETWEEN = 0.1
 """`progress` is called at most so often, and sets are made ready for no longer before they are drawn."""
@@ -71,15 +68,22 @@ def render_batch(
     width, height = side("width", width), side("height", height)
     sets = parameter_sets(load_scene(scene), parameters)
     shape = (sets.count, *shape_of(sets.scene(0), height, width))
-    dtype = np.dtype(variant(accuracy, target).result)
+    chosen = variant(accuracy, target)
+    dtype = np.dtype(chosen.result)
     images = np.empty(shape, dtype) if out is None else checked_out(out, shape, dtype, "count, height, width")
     thread_count(threads, 0)
-    batch = _Batch(sets, images, accuracy, target, clip, threads, portable, cache, _Tell(progress, sets.count))
-    first = 0
-    while first < sets.count:
-        first = batch.draw(first)
-        batch.tell.done(first)
-    batch.tell.all_done()
+    tell = _Tell(progress, sets.count, height)
+    asked = Asked(sets, width, height, accuracy, target, clip, threads, portable, cache)
+    job = Job(sets.base, chosen if chosen.settles else variant("stable"), clip, portable, cache, threads)
+    waiting, done = Waiting(deque(range(sets.count))), 0
+    while waiting.sets:
+        chunk = make_chunk(asked, waiting, SECONDS_BETWEEN)
+        onto = Target(images, job, threads, partial(chunk.scene, sets), tell.told)
+        for lot in chunk.lots.values():
+            lot.draw(onto)
+            done += len(lot.sets)
+            tell.done(done)
+    tell.all_done()
     return images
 
 
@@ -89,9 +93,33 @@ class _Tell:
 
     progress: Progress | None
     total: int
+    height: int
+    rows: int = 0
     last: float = field(default_factory=time.monotonic)
+    guard: Lock = field(default_factory=Lock)
 
     def done(self, count: int) -> None:
+        """So many images are done."""
+        self.rows = count * self.height
+        self._tell()
+
+    def told(self, render: Rows) -> Rows:
+        """What draws rows, made to tell, after a block of the caller, how many images' worth of rows are done."""
+        if self.progress is None:
+            return render
+        caller = get_ident()
+
+        def told(begin: int, end: int) -> None:
+            render(begin, end)
+            with self.guard:
+                self.rows += end - begin
+            if get_ident() == caller:
+                self._tell()
+
+        return told
+
+    def _tell(self) -> None:
+        count = self.rows // self.height
         if self.progress is None or count >= self.total:
             return
         now = time.monotonic()
@@ -100,108 +128,6 @@ class _Tell:
             self.progress(count, self.total)
 
     def all_done(self) -> None:
+        """Everything is."""
         if self.progress is not None:
             self.progress(self.total, self.total)
-
-
-@dataclass(frozen=True)
-class _Run:
-    """Consecutive sets that one call of one kernel draws."""
-
-    kernel: Kernel
-    numbers: NDArray[np.float64]
-    pixels: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class _Batch:
-    sets: Sets
-    images: NDArray[Any]
-    accuracy: str
-    target: str | None
-    clip: bool
-    threads: int | None
-    portable: bool
-    cache: str | Path | None
-    tell: _Tell
-
-    def draw(self, first: int) -> int:
-        """Draws some sets, from that one on. The first one that is left."""
-        runs: list[_Run] = []
-        end, begun = first, time.monotonic()
-        while end < min(self.sets.count, first + MOST_SETS):
-            found = self._made(end)
-            run = self._run(found, end)
-            if run is None or (runs and run.kernel is not runs[0].kernel):
-                break
-            runs.append(run)
-            end += len(run.pixels)
-            if time.monotonic() - begun > SECONDS_BETWEEN:
-                break
-        if runs:
-            self._draw_runs(runs, first, end)
-            return end
-        if isinstance(found, Job):
-            height, width = self.images.shape[1:3]
-            self.images[first] = settle_image(found, width, height).values
-        else:
-            found.draw(self.images[first], threads=self.threads)
-        return first + 1
-
-    def _made(self, index: int) -> Ready | Job:
-        height, width = self.images.shape[1:3]
-        return make_ready(
-            self.sets.scene(index),
-            width,
-            height,
-            self.accuracy,
-            self.target,
-            clip=self.clip,
-            threads=self.threads,
-            portable=self.portable,
-            cache=self.cache,
-        )
-
-    def _run(self, found: Ready | Job, first: int) -> _Run | None:
-        """The sets from the first on that the first one's kernel surely draws; None where it draws one at a time."""
-        if isinstance(found, Job) or not isinstance(found.drawing.kernel, Kernel) or not found.direct:
-            return None
-        if not rows_are_contiguous(self.images):
-            return None
-        drawing, kernel, height = found.drawing, found.drawing.kernel, self.images.shape[1]
-        last = first + MOST_SETS
-        if self.sets.scenes:
-            inputs = inputs_of_scenes(self.sets.scenes[first:last])
-        else:
-            inputs = inputs_of({path: column[first:last] for path, column in self.sets.columns.items()})
-        if inputs:
-            numbers, half_heights = rows_alike(found.scene, drawing.plan, inputs, self.accuracy, kernel.inputs)
-            return _Run(kernel, numbers, 2.0 * half_heights / height)
-        values = numbers_of(drawing.plan.scene)
-        pixel = pixel_size(drawing.plan.scene, height)
-        return _Run(kernel, np.array([[values[name] for name in kernel.inputs]]), np.array([pixel]))
-
-    def _draw_runs(self, runs: list[_Run], first: int, end: int) -> None:
-        _, height, width = self.images.shape
-        images, numbers = self.images[first:end], np.concatenate([run.numbers for run in runs])
-        grids = np.empty(end - first, GRID)
-        grids["width"], grids["height"] = width, height
-        grids["pixel"] = np.concatenate([run.pixels for run in runs])
-        grids["white"] = 1.0 if self.clip else np.inf
-        render = runs[0].kernel.onto_many(images, numbers, grids)
-        rows = (end - first) * height
-        threads = thread_count(self.threads, rows * width)
-        over_rows(render if self.tell.progress is None else self._told(render, first), rows, threads, width=width)
-
-    def _told(self, render: Callable[[int, int], object], first: int) -> Callable[[int, int], None]:
-        """The same, that tells after a block of the caller how many images' worth of rows are done."""
-        caller, guard, height, done = get_ident(), Lock(), self.images.shape[1], [0]
-
-        def told(begin: int, end: int) -> None:
-            render(begin, end)
-            with guard:
-                done[0] += end - begin
-            if get_ident() == caller:
-                self.tell.done(first + done[0] // height)
-
-        return told

@@ -7,7 +7,6 @@ that prove their values each block is proved by itself. Never here: the image as
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.errors import ArgumentError
-from symrender_cg.run.certify import Job, settle_rows
-from symrender_cg.run.ready import Ready, make_ready, shape_of, side
-from symrender_cg.run.threads import MOST_PIXELS, thread_count
+from symrender_cg.run.ready import Ready, make_ready, side
+from symrender_cg.run.settled_rows import SettledRows
+from symrender_cg.run.threads import thread_count
 from symrender_cg.scene import Scene, load_scene
 
 PIXELS_A_BLOCK = 1 << 20
@@ -63,7 +62,7 @@ def render_blocks(
         cache=cache,
         threads=threads,
     )
-    return _blocks(SettledRows(found, width, height) if isinstance(found, Job) else found, int(block_rows), threads)
+    return _blocks(found, int(block_rows), threads)
 
 
 def _blocks(source: Ready | SettledRows, block_rows: int, threads: int | None) -> Iterator[tuple[int, NDArray[Any]]]:
@@ -73,29 +72,3 @@ def _blocks(source: Ready | SettledRows, block_rows: int, threads: int | None) -
         source.draw(rows, first, threads=threads)
         yield first, rows
         del rows  # the block that was handed on is not kept while the next one is made
-
-
-@dataclass(frozen=True)
-class SettledRows:
-    """An image of a level that proves its values, to be drawn rows by rows; used as `Ready` is."""
-
-    job: Job
-    width: int
-    height: int
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(height, width) or (height, width, 3)."""
-        return shape_of(self.job.scene, self.height, self.width)
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Of what the level writes."""
-        return np.dtype(self.job.variant.result)
-
-    def draw(self, rows: NDArray[Any], first: int = 0, *, threads: int | None = None) -> None:
-        """Writes as many rows of the image as the array has, from row `first` on; any strides."""
-        job, some = replace(self.job, threads=threads), max(1, MOST_PIXELS // self.width)
-        for begin in range(0, len(rows), some):
-            end = min(begin + some, len(rows))
-            rows[begin:end] = settle_rows(job, self.width, self.height, first + begin, first + end).values

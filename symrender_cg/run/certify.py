@@ -12,9 +12,9 @@ pixels. Never done here: a value that is not proved.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from symrender_cg.errors import AccuracyError
 from symrender_cg.lower.variants import Variant
 from symrender_cg.pipeline import enclosure_kernel, pixel_size, settling_kernel
+from symrender_cg.run.enclosure_kernel import EnclosureKernel
 from symrender_cg.run.grid import pixel_centres
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.run.settling import settled
@@ -105,10 +106,13 @@ class Job:
 
 
 class _Points(Protocol):
-    """The points that are asked for, in an order."""
+    """The points that are asked for, in an order; aspect: of the window that they are in, None for any points."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...
+
+    @property
+    def aspect(self) -> float | None: ...
 
     def at(self, places: Places) -> tuple[Floats, Floats]: ...
 
@@ -126,6 +130,10 @@ class _Image:
     height: int
     first: int = 0
 
+    @property
+    def aspect(self) -> float:
+        return self.shape[1] / self.height
+
     def at(self, places: Places) -> tuple[Floats, Floats]:
         width = self.shape[1]
         columns, rows = pixel_centres(width, self.height, self.pixel)
@@ -136,18 +144,20 @@ class _Image:
 
     def settle(self, job: Job, kernel: SettlingKernel, numbers: Any) -> tuple[NDArray[Any], Places, float]:
         """The rows, the pixels of them that are left over, and the kernel's bound."""
+        image = np.empty(self.shape, dtype=kernel.dtype)
+        left_over = self.onto(image, job, kernel, numbers, job.threads)
+        bound = kernel.bound(numbers, width=self.shape[1], height=self.height, pixel=self.pixel)
+        return image, left_over, bound
+
+    def onto(self, image: NDArray[Any], job: Job, kernel: SettlingKernel, numbers: Any, threads: int | None) -> Places:
+        """Writes the rows by the kernel; the pixels of them that are left over."""
         count, width = self.shape
         first, height = self.first, self.height
-        image = np.empty(self.shape, dtype=kernel.dtype)
-        left_over: list[Places] = []
-
-        def some(begin: int, end: int) -> None:
-            rows = {"begin": first + begin, "end": first + end, "first": first, "height": height}
-            left_over.append(kernel.settle_rows(image, numbers, pixel=self.pixel, white=job.white, **rows))
-
-        over_rows(some, count, thread_count(job.threads, width * count), width=width)
-        bound = kernel.bound(numbers, width=width, height=height, pixel=self.pixel)
-        return image, np.sort(np.concatenate(left_over)) - first * width, bound
+        rows = kernel.shared_rows(image, numbers, pixel=self.pixel, white=job.white, first=first, height=height)
+        over_rows(rows, count, thread_count(threads, width * count), width=width, first=first)
+        found = rows.left_over
+        places = found[0] if len(found) == 1 else np.concatenate(found)
+        return np.sort(places) - first * width if places.size else places
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +165,7 @@ class _Cloud:
     shape: tuple[int, ...]
     x: Floats
     y: Floats
+    aspect: float | None = None
 
     def at(self, places: Places) -> tuple[Floats, Floats]:
         return self.x[places], self.y[places]
@@ -193,10 +204,15 @@ def settle_points(job: Job, x: Floats, y: Floats) -> Certified:
     return _settled(job, lambda _: _Cloud(x.shape, columns, rows), None)
 
 
-def settle_if_known(job: Job, x: Floats, y: Floats) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+def settle_if_known(
+    job: Job, x: Floats, y: Floats, aspect: float | None = None
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Values at points by the job's rule, by enclosure and oracle, and which of them are known: not those that rest on
-    a tie that nothing decides. x and y of shape (points,); values (points, channels)."""
-    points = _Cloud(x.shape, x, y)
+    a tie that nothing decides. x and y of shape (points,); values (points, channels).
+
+    aspect: of the image that the points are in, whose plan then serves here too; None for any points.
+    """
+    points = _Cloud(x.shape, x, y, aspect)
     values = np.empty((x.size, _channels(job.scene)), dtype=job.variant.result)
     known = np.zeros(x.size, dtype=np.bool_)
     places = np.arange(x.size)
@@ -217,32 +233,81 @@ def settle_if_known(job: Job, x: Floats, y: Floats) -> tuple[NDArray[Any], NDArr
     return values, known
 
 
+def settle_by_oracle(job: Job, width: int, height: int, places: Places) -> NDArray[Any]:
+    """The values of some pixels of an image, row * width + column, by the job's rule: shape (places, channels), or
+    (places,) of one channel. Raises AccuracyError naming those that even the oracle leaves open."""
+    image = _Image((height, width), pixel_size(job.scene.in_camera_frame(), height), height)
+    return _asked(job, image, places)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class FirstStage:
+    """The kernel that settles most of a job in images of that aspect (None: at any points), the scene that it draws,
+    and the numbers that it takes."""
+
+    job: Job
+    aspect: float | None
+    kernel: SettlingKernel
+    frame: Scene
+    numbers: Any
+
+    @cached_property
+    def enclosing(self) -> EnclosureKernel:
+        """The second stage."""
+        return _enclosing(self.job, self.aspect)
+
+
+def first_stage(job: Job, aspect: float | None) -> FirstStage | None:
+    """The first stage of a job; None where the enclosure is the first."""
+    found = settling_kernel(job.scene, job.variant, aspect=aspect, portable=job.portable, cache=job.cache)
+    return None if found is None else FirstStage(job, aspect, *found, _numbers(*found))
+
+
+def settle_onto(first: FirstStage, rows: NDArray[Any], height: int, begin: int, threads: int | None) -> None:
+    """Writes rows of an image of that height, from row `begin` on, into an array of contiguous rows, grey; the bits of
+    `settle_rows`, which also says what was proved."""
+    count, width = rows.shape
+    points = _Image((count, width), pixel_size(first.frame, height), height, begin)
+    places = points.onto(rows, first.job, first.kernel, first.numbers, threads)
+    if places.size:
+        job = replace(first.job, threads=threads)
+        for open_places, rounded, _ in _later_stages(job, points, places, first.enclosing):
+            rows[open_places // width, open_places % width] = rounded.reshape(-1)
+
+
 def _settled(job: Job, points_of: Callable[[Scene], _Points], aspect: float | None) -> Certified:
     channels = _channels(job.scene)
-    first = settling_kernel(job.scene, job.variant, aspect=aspect, portable=job.portable, cache=job.cache)
+    first = first_stage(job, aspect)
     stages: list[Stage] = []
     if first is None:
         points = points_of(job.scene.in_camera_frame())
         count = math.prod(points.shape)
         values, places = np.empty((count, channels), dtype=job.variant.result), np.arange(count)
     else:
-        kernel, frame = first
-        points = points_of(frame)
+        points = points_of(first.frame)
         count = math.prod(points.shape)
-        found, places, bound = points.settle(job, kernel, _numbers(kernel, frame))
+        found, places, bound = points.settle(job, first.kernel, first.numbers)
         values = found.reshape(count, 1)
         stages.append(Stage("kernel", count - places.size, bound))
         if channels == 3:
             values = np.repeat(values, 3, axis=1)
-    for name, stage in (("enclosure", _enclosed), ("oracle", _asked)):
-        if not places.size:
-            break
-        rounded, is_settled, bound = stage(job, points, places)
-        values[places] = rounded.reshape(places.size, -1)
-        stages.append(Stage(name, int(is_settled.sum()), bound))
-        places = places[~is_settled]
+    for open_places, rounded, stage in _later_stages(job, points, places):
+        values[open_places] = rounded.reshape(open_places.size, -1)
+        stages.append(stage)
     shape = points.shape if channels == 1 else (*points.shape, channels)
     return Certified(values.reshape(shape), Certificate(job.claim, count, tuple(stages)))
+
+
+def _later_stages(
+    job: Job, points: _Points, places: Places, kernel: EnclosureKernel | None = None
+) -> Iterator[tuple[Places, NDArray[Any], Stage]]:
+    """Places that are open, the values that the next stage gives them, settled or not, and what it settled."""
+    for name, stage in (("enclosure", partial(_enclosed, kernel=kernel)), ("oracle", _asked)):
+        if not places.size:
+            return
+        rounded, is_settled, bound = stage(job, points, places)
+        yield places, rounded, Stage(name, int(is_settled.sum()), bound)
+        places = places[~is_settled]
 
 
 @lru_cache(maxsize=64)
@@ -256,10 +321,15 @@ def _numbers(kernel: SettlingKernel, frame: Scene) -> Any:
     return kernel.numbers(numbers_of(frame))
 
 
-def _enclosed(job: Job, points: _Points, places: Places) -> tuple[NDArray[Any], NDArray[np.bool_], float]:
+def _enclosing(job: Job, aspect: float | None) -> EnclosureKernel:
+    return enclosure_kernel(job.scene, aspect=aspect, portable=job.portable, cache=job.cache)
+
+
+def _enclosed(
+    job: Job, points: _Points, places: Places, kernel: EnclosureKernel | None = None
+) -> tuple[NDArray[Any], NDArray[np.bool_], float]:
     """Values at places, which of them are settled, and the largest error of those: by the enclosure kernel."""
-    kernel = enclosure_kernel(job.scene, portable=job.portable, cache=job.cache)
-    found = kernel.enclose(*points.at(places), threads=job.threads)
+    found = (kernel or _enclosing(job, points.aspect)).enclose(*points.at(places), threads=job.threads)
     rounded, is_settled = settled(found, job.rule)
     whole = np.asarray(is_settled.reshape(places.size, -1).all(axis=1), dtype=np.bool_)
     errors = found.error.reshape(places.size, -1)[whole]

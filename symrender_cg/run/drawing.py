@@ -7,17 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.plan.plan import Plan
+from symrender_cg.run.grid import pixel_centres
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.numbers import numbers_of
+from symrender_cg.run.pool import SCENE_PIXELS, Pool, Shared
 from symrender_cg.run.scene_kernel import Prepared, SceneKernel
 from symrender_cg.run.scene_numbers import scene_numbers
+from symrender_cg.run.steep import Box
+from symrender_cg.run.threads import over_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +36,7 @@ class Drawing:
     decide     (x, y) -> values at points where rounding may have decided, and which of them are known; None: the kernel
                of the level decides nothing by rounding, or promises nothing of it
     width      of the image in pixels, and its height; 1 and 1 for points
+    steep      what draws a box of the image in place of the kernel of one sphere, see steep.py
     """
 
     plan: Plan
@@ -42,6 +47,7 @@ class Drawing:
     decide: Decide | None = None
     width: int = 1
     height: int = 1
+    steep: Steep | None = None
 
     @cached_property
     def grid(self) -> Any:
@@ -66,11 +72,9 @@ class Drawing:
     def onto(self, image: NDArray[Any], first: int = 0) -> Callable[[int, int], None]:
         """What writes rows [begin, end) of the image into an array with contiguous rows, whose row 0 is row `first`."""
         if isinstance(self.kernel, Kernel):
-            return self.kernel.onto(image, self.numbers, self.grid, first=first)
-        return partial(self._scene_rows, image, first)
-
-    def _scene_rows(self, image: NDArray[Any], first: int, begin: int, end: int) -> None:
-        self.rows(image, begin, end, first=first)
+            rows = self.kernel.onto(image, self.numbers, self.grid, first=first)
+            return rows if self.steep is None else SteepRows(self, image, first, rows)
+        return SceneRows(self, image, first)
 
     def rows(
         self,
@@ -90,7 +94,12 @@ class Drawing:
             self.onto(image, first)(begin, end)
             return
         doubtful = self.kernel.rows(image, self.numbers, begin=begin, end=end, layers=layers, first=first)
-        if doubtful.size and self.decide is not None and layers is None:
+        if layers is None:
+            self.settle(image, doubtful, first)
+
+    def settle(self, image: NDArray[Any], doubtful: NDArray[np.intp], first: int) -> None:
+        """Writes those pixels, row * width + column, that are known without rounding, where the level promises it."""
+        if doubtful.size and self.decide is not None:
             row, column = doubtful // self.width, doubtful % self.width
             x = (column + (0.5 - 0.5 * self.width)) * np.float64(self.pixel)
             y = ((0.5 * self.height - 0.5) - row) * np.float64(self.pixel)
@@ -107,11 +116,91 @@ class Drawing:
                 flat[doubtful[known]] = self._narrowed(found[known])
         else:
             self.kernel.points(values, x, y, self.numbers, white=self.white)
+            if self.steep is not None and (inside := self.steep.box.holds(x, y).reshape(-1)).any():
+                found = self.steep.values(x.reshape(-1)[inside], y.reshape(-1)[inside])
+                values.reshape(-1)[inside] = np.minimum(found, self.white)
+
+    def draw_steep(self, image: NDArray[Any], begin: int, end: int, first: int) -> None:
+        """Writes what rows [begin, end) have of the box where the highlight is steep."""
+        assert self.steep is not None, "there is one"
+        box = self.steep.box
+        x, _ = pixel_centres(self.width, 1, self.pixel)
+        y = ((0.5 * self.height - 0.5) - np.arange(begin, end)) * np.float64(self.pixel)
+        columns, rows = (np.flatnonzero(inside) for inside in (box.across(x), box.down(y)))
+        if columns.size and rows.size:
+            across, down = slice(columns[0], columns[-1] + 1), slice(rows[0], rows[-1] + 1)
+            at_x, at_y = np.broadcast_arrays(x[across], y[down, np.newaxis])
+            values = self.steep.values(at_x.reshape(-1), at_y.reshape(-1)).reshape(at_x.shape)
+            at = begin - first
+            image[at + down.start : at + down.stop, across] = np.minimum(values, self.white)
 
     def _narrowed(self, values: NDArray[Any]) -> NDArray[Any]:
         """Settled values as the kernel would have written them: in its channels, white at most."""
         cut: NDArray[Any] = np.minimum(values, self.white)
         return cut[:, 0] if self.channels == 1 else cut
+
+
+class SceneRows(Shared):
+    """Rows of a scene's image, which the threads of the pool may draw; what rounding decided is settled after them."""
+
+    __slots__ = ("drawing", "first", "image", "library")
+    least_pixels = SCENE_PIXELS
+
+    def __init__(self, drawing: Drawing, image: NDArray[Any], first: int) -> None:
+        self.drawing, self.image, self.first = drawing, image, first
+        self.library = drawing.kernel.library
+
+    def __call__(self, begin: int, end: int, /) -> None:
+        self.drawing.rows(self.image, begin, end, first=self.first)
+
+    def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
+        """Draws rows [begin, end) on so many threads, at least so many rows at a time."""
+        drawing, image, first = self.drawing, self.image, self.first
+        assert isinstance(drawing.kernel, SceneKernel), "a kernel of one sphere binds its rows itself"
+        doubtful = drawing.kernel.share_rows(pool, image, drawing.numbers, begin, end, first, least, threads)
+        if doubtful.size < LEAST_SHARED:
+            drawing.settle(image, doubtful, first)
+        else:
+            over_rows(lambda k, last: drawing.settle(image, doubtful[k:last], first), doubtful.size, threads)
+
+
+class SteepRows(Shared):
+    """Rows of one sphere's image, and after them what they have of the box where the highlight is steep."""
+
+    __slots__ = ("drawing", "first", "image", "library", "rows")
+    rows: Callable[[int, int], None]
+
+    def __init__(self, drawing: Drawing, image: NDArray[Any], first: int, rows: Callable[[int, int], None]) -> None:
+        self.drawing, self.image, self.first, self.rows = drawing, image, first, rows
+        self.library = drawing.kernel.library
+
+    @property
+    def least_pixels(self) -> int:  # type: ignore[override]
+        """That of the kernel's rows."""
+        assert isinstance(self.rows, Shared), "a kernel's rows are"
+        return self.rows.least_pixels
+
+    def __call__(self, begin: int, end: int, /) -> None:
+        self.rows(begin, end)
+        self.drawing.draw_steep(self.image, begin, end, self.first)
+
+    def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
+        """Draws rows [begin, end) on so many threads, at least so many rows at a time."""
+        assert isinstance(self.rows, Shared), "a kernel's rows are"
+        self.rows.share(pool, begin, end, least, threads)
+        self.drawing.draw_steep(self.image, begin, end, self.first)
+
+
+LEAST_SHARED = 256
+"""So many points in doubt are some milliseconds of work: enough to wake threads of Python for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Steep:
+    """A box of the image plane, and what gives values at points in it, unclipped."""
+
+    box: Box
+    values: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[Any]]
 
 
 Decide = Callable[[NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[Any], NDArray[np.bool_]]]
@@ -126,13 +215,14 @@ def bind(
     pixel: float = 1.0,
     white: float,
     decide: Decide | None = None,
+    steep: Steep | None = None,
 ) -> Drawing:
     """A kernel and a plan that it was made for, with the numbers of the plan's scene."""
     if isinstance(kernel, SceneKernel):
         numbers: Any = _prepared(kernel, SamePlan(plan), width, height, pixel, white)
     else:
         numbers = kernel.numbers(numbers_of(plan.scene))
-    return Drawing(plan, kernel, numbers, pixel, white, decide, width, height)
+    return Drawing(plan, kernel, numbers, pixel, white, decide, width, height, steep)
 
 
 class SamePlan:

@@ -6,6 +6,7 @@ Comes in: a plan with an arrangement, points of the image plane. Goes out: Enclo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
@@ -17,6 +18,7 @@ from symrender_cg.build.library import CachedKernel, Library
 from symrender_cg.plan.plan import Plan
 from symrender_cg.run.enclosure_numbers import exact_numbers
 from symrender_cg.run.scene_numbers import scene_numbers
+from symrender_cg.run.structures import layout, structures
 from symrender_cg.run.threads import over_rows, thread_count
 
 _CHUNK: Final = 1024
@@ -43,7 +45,7 @@ class Enclosure:
 class EnclosureKernel:
     """A native enclosure bound to a scene.
 
-    name      its C name; the entry point is name_points
+    name      its C name; the entry points are name_points and name_batch
     fields    (name, shape) of its scene structure's fields
     channels  1 or 3
     plan      of the scene that is enclosed
@@ -82,6 +84,15 @@ class EnclosureKernel:
         shape = given_x.shape if self.channels == 1 else (*given_x.shape, self.channels)
         return Enclosure(hi.reshape(shape), lo.reshape(shape), error.reshape(shape))
 
+    @property
+    def structure(self) -> np.dtype[Any]:
+        """The scene's structure as numpy sees it."""
+        return layout(self.library, f"{self.name}_scene", self.fields)
+
+    def structures(self) -> tuple[NDArray[Any], tuple[Any, ...]]:
+        """The scene as an array of one structure, and what it refers to."""
+        return structures(self.library, f"{self.name}_scene", self.fields, [self.numbers()])
+
     def numbers(self) -> dict[str, Any]:
         """The scene as the kernel takes it: numbers and arrays by the names of its fields."""
         found = self.plan.arrangement
@@ -90,18 +101,44 @@ class EnclosureKernel:
         return scene_numbers(frame, found, self.channels) | exact_numbers(frame, nearer=self.nearer)
 
 
+def enclose_many(
+    kernel: EnclosureKernel,
+    scenes: NDArray[Any],
+    x: Sequence[NDArray[np.float64]],
+    y: Sequence[NDArray[np.float64]],
+    threads: int | None = None,
+) -> list[Enclosure]:
+    """The intensities at points of many scenes, in one call a thread and chunk; x and y (points,) of each scene.
+
+    scenes: structures of the kernel's kind, one a scene; what they refer to must be kept. Raises MemoryError.
+    """
+    entry, ffi = getattr(kernel.library.lib, f"{kernel.name}_batch"), kernel.library.ffi
+    begins = np.cumsum([0, *(part.size for part in x)], dtype=np.intp)
+    columns, rows = (np.ascontiguousarray(np.concatenate(parts), dtype=np.float64) for parts in (x, y))
+    hi, lo, error = (np.empty((columns.size, kernel.channels)) for _ in range(3))
+
+    def some(begin: int, end: int) -> None:
+        at, last = begin * _CHUNK, min(end * _CHUNK, columns.size)
+        low = int(np.searchsorted(begins, at, side="right")) - 1
+        high = int(np.searchsorted(begins, last, side="left"))
+        bounds = np.clip(begins[low : high + 1], at, last) - at
+        pointers = [ffi.cast("double *", a[at:last].ctypes.data) for a in (hi, lo, error, columns, rows)]
+        given = ffi.from_buffer("ptrdiff_t *", bounds), ffi.from_buffer(f"{kernel.name}_scene *", scenes) + low
+        if entry(*pointers, *given, high - low):
+            raise MemoryError(f"no memory for the tables of {high - low} scenes")
+
+    if columns.size:
+        over_rows(some, -(-columns.size // _CHUNK), thread_count(threads, _AS_PIXELS * columns.size))
+    shapes = [(part.size,) if kernel.channels == 1 else (part.size, kernel.channels) for part in x]
+    pieces = [slice(begins[k], begins[k + 1]) for k in range(len(scenes))]
+    return [
+        Enclosure(*(part[piece].reshape(shape) for part in (hi, lo, error)))
+        for piece, shape in zip(pieces, shapes, strict=True)
+    ]
+
+
 @lru_cache(maxsize=8)
 def _structure(kernel: EnclosureKernel) -> tuple[Any, tuple[Any, ...]]:
     """The scene as C sees it, and the arrays that it refers to; remembered: a scene is asked about more than once."""
-    ffi, numbers = kernel.library.ffi, kernel.numbers()
-    scene = ffi.new(f"{kernel.name}_scene *")
-    keeps: list[Any] = []
-    for name, shape in kernel.fields:
-        value = numbers[name]
-        if shape in ("reals", "wholes"):
-            array = np.ascontiguousarray(value, dtype=np.float64 if shape == "reals" else np.int32)
-            keeps.append(array)
-            setattr(scene, name, ffi.cast("double *" if shape == "reals" else "int *", array.ctypes.data))
-        else:
-            setattr(scene, name, value)
-    return scene, tuple(keeps)
+    made, keeps = kernel.structures()
+    return kernel.library.ffi.from_buffer(f"{kernel.name}_scene *", made), (made, *keeps)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from symrender_cg.build.library import CachedKernel, Library
 from symrender_cg.errors import LibraryError
+from symrender_cg.run.pool import NativeRows
 
 GRID = np.dtype([("width", np.int32), ("height", np.int32), ("pixel", np.float64), ("white", np.float64)])
 """symrender_grid, as the C lays it out."""
@@ -73,9 +74,16 @@ class Kernel:
 
         first: the row that row 0 of the array is; it may hold a part of the image's rows. The array must be kept.
         """
-        pointer = pointer_to(image, f"{self._real} *", self.library, first=first)
-        stride, entry = image.strides[0] // image.itemsize, self._entry("rows")
-        return partial(entry, pointer, stride, grid) if self.baked else partial(entry, pointer, stride, grid, numbers)
+        entry, kind = self._rows_of
+        pointer = pointer_to(image, kind, self.library, first=first)
+        stride = image.strides[0] // image.itemsize
+        rows = (
+            NativeRows(entry, pointer, stride, grid)
+            if self.baked
+            else NativeRows(entry, pointer, stride, grid, numbers)
+        )
+        rows.library = self.library
+        return rows
 
     def onto_many(self, images: NDArray[Any], numbers: NDArray[np.float64], grids: NDArray[Any]) -> Callable[..., None]:
         """The C function that writes rows [begin, end) of many images, counted through: row j of image k is number
@@ -88,7 +96,9 @@ class Kernel:
         pointer = pointer_to(images, f"{self._real} *", self.library)
         strides = images.strides[0] // item, images.strides[1] // item
         grid, scenes = ffi.from_buffer("symrender_grid *", grids), ffi.from_buffer("double *", numbers)
-        return partial(self._entry("batch"), pointer, *strides, grid, scenes)
+        rows = NativeRows(self._entry("batch"), pointer, *strides, grid, scenes)
+        rows.library = self.library
+        return rows
 
     def points(
         self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], numbers: Any, *, white: float
@@ -103,6 +113,15 @@ class Kernel:
         arguments = (*pointers, values.size, white)
         self._entry("points")(*(arguments if self.baked else (*arguments, numbers)))
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what another process finds for itself."""
+        return {name: value for name, value in self.__dict__.items() if name != "_rows_of"}
+
+    @cached_property
+    def _rows_of(self) -> tuple[Any, str]:
+        """The entry point for rows, and the pointer that it takes."""
+        return self._entry("rows"), f"{self._real} *"
+
     @property
     def _real(self) -> str:
         return "float" if self.dtype == np.float32 else "double"
@@ -115,3 +134,12 @@ class Kernel:
                 f"{self.library.path} has no entry point {self.name}_{suffix}; "
                 "remove that folder of the cache and try again"
             ) from problem
+
+
+def rows_are_contiguous(image: NDArray[Any], channels: int = 1) -> bool:
+    """Whether a kernel can write to an image, or to many: contiguous rows, whole numbers of values apart, aligned."""
+    item, strides = image.itemsize, image.strides
+    steps = (item,) if channels == 1 else (item * channels, item)
+    if strides[-len(steps) :] != steps or not image.flags.aligned:
+        return False
+    return strides[0] % item == 0 and strides[1] % item == 0

@@ -1,7 +1,7 @@
 """`ready`: all that a call of render_image looks up, remembered for a scene that is drawn again.
 
-In: the arguments of render_image. Out: a `Ready`, which draws rows of that image into any array, or the `Job` of what
-is proved value by value. A scene is known by its identity: nothing is hashed or compared, so a warm call costs a look
+In: the arguments of render_image. Out: a `Ready`, or `SettledRows` where each value is proved: both draw rows of that
+image into any array. A scene is known by its identity: nothing is hashed or compared, so a warm call costs a look
 into a dictionary, of however many spheres the scene is. Never here: an image.
 """
 
@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import Variant
 from symrender_cg.pipeline import draw, note, statistics
-from symrender_cg.run.certify import Job
 from symrender_cg.run.drawing import Drawing
+from symrender_cg.run.kernel import rows_are_contiguous
 from symrender_cg.run.levels import drawn_as, job_of
+from symrender_cg.run.settled_rows import SettledRows
 from symrender_cg.run.threads import MOST_PIXELS, over_rows, thread_count
 from symrender_cg.scene import Scene, load_scene
 
@@ -53,7 +54,7 @@ class Ready:
         count, width = rows.shape[:2]
         threads = thread_count(threads, count * width)
         if self.direct and rows_are_contiguous(rows, self.drawing.channels):
-            _draw(self.drawing.onto(rows, first), first, count, width, threads)
+            over_rows(self.drawing.onto(rows, first), count, threads, width=width, first=first)
             return
         some = max(1, min(count, MOST_PIXELS // width))
         canvas = np.empty(self.drawing.shape(some, width), self.dtype)
@@ -61,7 +62,7 @@ class Ready:
         for begin in range(0, count, some):
             block = rows[begin : begin + some]
             write = self.drawing.onto(canvas, first + begin)
-            _draw(write, first + begin, len(block), width, threads)
+            over_rows(write, len(block), threads, width=width, first=first + begin)
             block[...] = canvas[: len(block)] if self.direct else canvas[: len(block), :, np.newaxis]
 
 
@@ -77,21 +78,23 @@ def ready(
     portable: bool,
     cache: str | Path | None,
     threads: int | None,
-) -> Ready | Job:
-    """The image that these arguments ask for, made ready, or the job of their level.
+    tolerance: float = 0.0,
+) -> Ready | SettledRows:
+    """The image that these arguments ask for, made ready.
 
     Raises what render_image raises for its arguments.
     """
     key: tuple[object, ...] | None = None
     if (scene is None or type(scene) is Scene) and type(width) is int and type(height) is int and type(accuracy) is str:
         folder = os.environ.get("SYMRENDER_CACHE_DIR") if cache is None else cache
-        key = (id(scene), width, height, accuracy, target, clip, bake, portable, folder)
+        key = (id(scene), width, height, accuracy, target, clip, bake, portable, folder, tolerance)
         try:
             found = _kept.get(key)
         except TypeError:  # an argument of no known type, which is refused below
             key = found = None
         if found is not None:
-            note(found.drawing.plan)
+            if isinstance(found, Ready):
+                note(found.drawing.plan)
             statistics.add("reused")
             return found
     width, height = side("width", width), side("height", height)
@@ -106,8 +109,9 @@ def ready(
         portable=portable,
         cache=cache,
         threads=threads,
+        tolerance=tolerance,
     )
-    if key is not None and isinstance(made, Ready):
+    if key is not None:
         _keep(key, made)
     return made
 
@@ -124,33 +128,49 @@ def make_ready(
     portable: bool = False,
     cache: str | Path | None = None,
     threads: int | None = None,
-) -> Ready | Job:
-    """The same, looked up or planned by the scene's value, and not remembered here."""
-    job = job_of(scene, accuracy, target, clip=clip, bake=bake, portable=portable, cache=cache, threads=threads)
+    tolerance: float = 0.0,
+) -> Ready | SettledRows:
+    """The same, looked up or planned by the scene's value, and not remembered here.
+
+    tolerance   how much any pixel may change by what the plan leaves out, where one kernel draws
+    """
+    job = job_of(
+        scene,
+        accuracy,
+        target,
+        clip=clip,
+        bake=bake,
+        portable=portable,
+        cache=cache,
+        threads=threads,
+        aspect=width / height,
+    )
     if job is not None:
-        return job
+        return SettledRows(job, width, height)
     drawn = drawn_as(scene, accuracy)
-    drawing = draw(scene, drawn, size=(width, height), clip=clip, bake=bake, portable=portable, cache=cache)
+    drawing = draw(
+        scene,
+        drawn,
+        size=(width, height),
+        clip=clip,
+        bake=bake,
+        portable=portable,
+        max_error=tolerance,
+        cache=cache,
+    )
     shape = shape_of(scene, height, width)
     return Ready(scene, drawing, shape, drawing.dtype, drawing.shape(height, width) == shape)
 
 
-_kept: dict[tuple[object, ...], Ready] = {}
+_kept: dict[tuple[object, ...], Ready | SettledRows] = {}
 _guard = Lock()
 
 
-def _keep(key: tuple[object, ...], made: Ready) -> None:
+def _keep(key: tuple[object, ...], made: Ready | SettledRows) -> None:
     with _guard:
         while len(_kept) >= MOST_KEPT:
             del _kept[next(iter(_kept))]
         _kept[key] = made
-
-
-def _draw(write: Callable[[int, int], None], first: int, count: int, width: int, threads: int) -> None:
-    if first == 0:
-        over_rows(write, count, threads, width=width)
-    else:
-        over_rows(lambda begin, end: write(first + begin, first + end), count, threads, width=width)
 
 
 def shape_of(scene: Scene, *points: int) -> tuple[int, ...]:
@@ -187,12 +207,3 @@ def checked_out(
     if not out.flags.writeable:
         raise ArgumentError("out: is read-only; pass an array that can be written to")
     return out
-
-
-def rows_are_contiguous(image: NDArray[Any], channels: int = 1) -> bool:
-    """Whether a kernel can write to an image, or to many: contiguous rows, whole numbers of values apart, aligned."""
-    item, strides = image.itemsize, image.strides
-    steps = (item,) if channels == 1 else (item * channels, item)
-    if strides[-len(steps) :] != steps or not image.flags.aligned:
-        return False
-    return strides[0] % item == 0 and strides[1] % item == 0

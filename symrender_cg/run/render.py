@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from symrender_cg.errors import ArgumentError, OutsidePlanError
 from symrender_cg.lower.variants import Variant
 from symrender_cg.pipeline import draw, pixel_size
-from symrender_cg.run.blocks import SettledRows
 from symrender_cg.run.bounds import error_bounds
-from symrender_cg.run.certify import Certified, Job, settle_image, settle_points
+from symrender_cg.run.certify import Certified, settle_image, settle_points
 from symrender_cg.run.grid import pixel_centres
 from symrender_cg.run.levels import drawn_as, job_of
 from symrender_cg.run.ready import checked_out, ready, shape_of, side
@@ -54,7 +53,8 @@ def render_image(
                "stable" (within 4 ulp), "certified" (every value correctly rounded, see `certify`)
     target     what "certified" rounds to, and returns: "float64", "float32" or "uint8" (grey levels of 0 to 255)
     max_error  in place of accuracy: the fastest variant on this machine whose error is at most this, unclipped
-    max_ulp    the same in units of the last place; `bits`: half a step of so many bits (see symrender_cg.cost.choose)
+    max_ulp    the same in units of the last place; `bits`: half a step of so many bits (see symrender_cg.cost.choose);
+               beside one of them `bake` takes baked kernels into account, too
     clip       cut to [0, 1] as a picture is; False keeps the field itself, which may exceed 1
     out        array of that shape and dtype to write into; any strides, writable
     threads    threads over rows; any number gives the same bits
@@ -66,9 +66,12 @@ def render_image(
     Raises ArgumentError, SceneError, OutsidePlanError or ToolchainError, and AccuracyError where no certificate can be
     given or nothing meets what is asked for, see symrender_cg.errors.
     """
+    tolerance = 0.0
     if max_error is not None or max_ulp is not None or bits is not None:
-        given = _choosing(accuracy, target, bake, portable, backend)
-        accuracy, target = _meeting(scene, max_error, max_ulp, bits, given, out=out, cache=cache)
+        width, height = side("width", width), side("height", height)
+        given = _choosing(accuracy, target, portable, backend)
+        how = {"bake": bake, "out": out, "aspect": width / height, "cache": cache}
+        accuracy, target, bake, tolerance = _meeting(scene, max_error, max_ulp, bits, given, **how)
     if backend == "numpy":
         width, height = side("width", width), side("height", height)
         chosen = load_scene(scene)
@@ -88,14 +91,8 @@ def render_image(
         portable=portable,
         cache=cache,
         threads=threads,
+        tolerance=tolerance,
     )
-    if isinstance(found, Job):
-        width, height = side("width", width), side("height", height)
-        if out is None:
-            return settle_image(found, width, height).values
-        settled = SettledRows(found, width, height)
-        settled.draw(checked_out(out, settled.shape, settled.dtype), threads=threads)
-        return out
     image = np.empty(found.shape, found.dtype) if out is None else checked_out(out, found.shape, found.dtype)
     found.draw(image, threads=threads)
     return image
@@ -193,7 +190,8 @@ def evaluate(
     and a last axis of 3 channels for a scene with colours.
 
     The plane passes through the point looked at, x to the right and y upwards. On the pixel centres of an image the
-    values are those of `render_image`, bit for bit. Arguments as there, but `clip` is off by default.
+    values are those of `render_image`, bit for bit ("single" and "fast": a few units in the last place apart, as rows
+    count their pixels in float32). Arguments as there, but `clip` is off by default.
 
     with_bound    (values, bounds): of each value a float64 that its error does not exceed, proved; for any accuracy
 
@@ -202,8 +200,11 @@ def evaluate(
     chosen = load_scene(scene)
     points_x, points_y = _points(x, y)
     if max_error is not None or max_ulp is not None or bits is not None:
-        given = _choosing(accuracy, target, bake, portable, backend)
-        accuracy, target = _meeting(chosen, max_error, max_ulp, bits, given, points=(points_x, points_y), cache=cache)
+        given = _choosing(accuracy, target, portable, backend)
+        points = points_x, points_y
+        accuracy, target, bake, _ = _meeting(
+            chosen, max_error, max_ulp, bits, given, bake=bake, points=points, cache=cache
+        )
     if with_bound:
         values = evaluate(
             chosen,
@@ -230,14 +231,11 @@ def evaluate(
     return np.array(_as_colour(values, shape_of(chosen, *points_x.shape)))
 
 
-def _choosing(
-    accuracy: str | Variant, target: str | None, bake: bool, portable: bool, backend: str
-) -> dict[str, tuple[Any, Any]]:
+def _choosing(accuracy: str | Variant, target: str | None, portable: bool, backend: str) -> dict[str, tuple[Any, Any]]:
     """Arguments that choose a kernel, each with what it is if it is left out."""
     return {
         "accuracy": (accuracy, "double"),
         "target": (target, None),
-        "bake": (bake, False),
         "portable": (portable, False),
         "backend": (backend, "native"),
     }
@@ -250,7 +248,7 @@ def _meeting(
     bits: float | None,
     given: dict[str, tuple[Any, Any]],
     **how: Any,
-) -> tuple[str, str | None]:
+) -> tuple[str, str | None, bool, float]:
     from symrender_cg.cost.asked import meeting
 
     return meeting(scene, max_error=max_error, max_ulp=max_ulp, bits=bits, given=given, **how)

@@ -5,7 +5,7 @@ The one place that knows how arrays of Python become the pointers of C, and that
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from symrender_cg.build.library import CachedKernel, Library
 from symrender_cg.run.kernel import pointer_to
+from symrender_cg.run.pool import Pool
+from symrender_cg.run.structures import layout, structures
 
 LAYERS = ("depth", "normal", "index", "background", "ambient", "reflected", "diffuse", "specular")
 """What a kernel can write beside the image, in the order of its C structure's fields."""
@@ -28,10 +30,19 @@ class Prepared:
 
 
 @dataclass(frozen=True, eq=False)
+class PreparedMany:
+    """Scenes of one structure made ready for images of one size: the C's frames and everything that they refer to."""
+
+    frames: Any
+    keeps: tuple[Any, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class SceneKernel:
     """A native kernel of a scene and how to call it.
 
-    name       its C name; the entry points are name_prepare, name_rows, name_points, name_release
+    name       its C name; the entry points are name_prepare, name_rows, name_points, name_release, and name_batch with
+               name_prepare_many and name_release_many
     fields     (name, shape) of its scene structure's fields; shape is number, whole, reals or wholes
     channels   1 or 3
     dtype      float64 or float32
@@ -101,6 +112,70 @@ class SceneKernel:
         if found < 0:
             raise MemoryError(f"no memory for rows {begin} to {end} of the image")
         return unsettled[:found].copy()
+
+    def share_rows(
+        self,
+        pool: Pool,
+        image: NDArray[Any],
+        prepared: Prepared,
+        begin: int,
+        end: int,
+        first: int,
+        least: int,
+        threads: int,
+    ) -> NDArray[np.intp]:
+        """As `rows` does without layers, on so many threads of the pool, each at least so many rows at a time."""
+        pointer = pointer_to(image, f"{self._real} *", self.library, first=first)
+        stride, entry = image.strides[0] // image.itemsize, getattr(self.library.lib, f"{self.name}_rows")
+        bound = entry, pointer, stride, prepared.frame, self.library.ffi.NULL
+        return pool.listing_rows(*bound, begin, end, least, threads, image.shape[1])
+
+    @property
+    def structure(self) -> np.dtype[Any]:
+        """The scene's structure as numpy sees it."""
+        return layout(self.library, f"{self.name}_scene", self.fields)
+
+    def structures(self, scenes: Sequence[Mapping[str, Any]]) -> tuple[NDArray[Any], tuple[Any, ...]]:
+        """The numbers of many scenes as the C sees them, and what has to be kept for them."""
+        return structures(self.library, f"{self.name}_scene", self.fields, scenes)
+
+    def prepare_many(self, scenes: NDArray[Any], grids: NDArray[Any]) -> PreparedMany:
+        """Structures of many scenes, each with its grid (an array of kernel.GRID), as `prepare` has those of one.
+
+        What the structures refer to must be kept.
+        """
+        ffi, lib = self.library.ffi, self.library.lib
+        frames, count = ffi.new(f"{self.name}_frame *[]", len(scenes)), len(scenes)
+        made = ffi.from_buffer(f"{self.name}_scene *", scenes)
+        given = ffi.from_buffer("symrender_grid *", grids)
+        if getattr(lib, f"{self.name}_prepare_many")(frames, made, count, given):
+            raise MemoryError(f"no memory for the tables of {count} scenes")
+        release = getattr(lib, f"{self.name}_release_many")
+        return PreparedMany(ffi.gc(frames, lambda held: release(held, count)), (scenes, grids))
+
+    def onto_many(
+        self, images: Sequence[NDArray[Any]], prepared: PreparedMany
+    ) -> Callable[[int, int], NDArray[np.intp]]:
+        """What writes rows [begin, end) of many images, counted through: row j of image k is number k * height + j; it
+        returns the pixels (k * height + row) * width + column that rounding may have decided. Releases the GIL.
+
+        images: arrays of one shape with contiguous rows, equally far apart. They and `prepared` must be kept.
+        """
+        ffi = self.library.ffi
+        height, width = images[0].shape[:2]
+        stride = images[0].strides[0] // images[0].itemsize
+        pointers = ffi.new(f"{self._real} *[]", [ffi.cast(f"{self._real} *", image.ctypes.data) for image in images])
+        entry = getattr(self.library.lib, f"{self.name}_batch")
+
+        def rows(begin: int, end: int) -> NDArray[np.intp]:
+            unsettled = np.empty((end - begin) * width, dtype=np.intp)
+            listed = ffi.cast("ptrdiff_t *", unsettled.ctypes.data)
+            found = entry(pointers, stride, prepared.frames, begin, end, listed)
+            if found < 0:
+                raise MemoryError(f"no memory for rows {begin} to {end} of {len(images)} images of {height}")
+            return unsettled[:found].copy()
+
+        return rows
 
     def points(
         self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], prepared: Prepared

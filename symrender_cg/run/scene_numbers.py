@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.plan.arrangement import Arrangement
+from symrender_cg.run.enclosure_numbers import as_triple
 from symrender_cg.scene import Colour, Gradient, Phong, PointLight, Scene, exact
 from symrender_cg.scene.exact import Vector
 
@@ -22,10 +23,15 @@ DIFFUSE, SPECULAR, GATED = 1, 2, 4
 
 @dataclass(frozen=True)
 class _Ground:
-    """The plane: unit normal on the eye's side, height of the eye above it, the eye's tile and the steps of tiles."""
+    """The plane: unit normal on the eye's side, height of the eye above it, the eye's tile and the steps of tiles.
+
+    Of normal and height also what rounding left, for kernels that take them in two words.
+    """
 
     normal: Vector
+    normal_low: Vector
     height: float
+    height_low: float
     across: Vector
     across_0: float
     along: Vector
@@ -40,8 +46,10 @@ def scene_numbers(frame: Scene, found: Arrangement, channels: int) -> dict[str, 
     ground = _ground(frame) if frame.plane is not None else None
     centers = [*(sphere.center for sphere in spheres), *([(0.0, 0.0, eye)] * len(found.plane_materials))]
     radii = [sphere.radius for sphere in spheres]
+    low_words: list[float] = []
     if ground is not None:
         radii += [ground.height] * len(found.plane_materials)
+        low_words = [ground.height_low] * len(found.plane_materials)
     place = np.array(centers, dtype=np.float64).reshape(-1, 3)
     numbers: dict[str, Any] = {
         "eye": eye,
@@ -50,6 +58,7 @@ def scene_numbers(frame: Scene, found: Arrangement, channels: int) -> dict[str, 
         "receivers": len(materials),
         **{f"center_{axis}": np.ascontiguousarray(place[:, i]) for i, axis in enumerate("xyz")},
         "radius": _reals(radii),
+        "radius_low": _reals([0.0] * len(spheres) + low_words),
         "at_eye": _wholes(found.at_eye),
         "partners_begin": _wholes(found.partners_begin),
         "partners": _wholes(found.partners),
@@ -134,6 +143,7 @@ def _plane(ground: _Ground | None) -> dict[str, Any]:
     for i, axis in enumerate("xyz"):
         numbers |= {
             f"plane_{axis}": ground.normal[i],
+            f"plane_{axis}_low": ground.normal_low[i],
             f"across_{axis}": ground.across[i],
             f"along_{axis}": ground.along[i],
         }
@@ -169,10 +179,16 @@ def _ground(frame: Scene) -> _Ground:
     along = exact.cross(normal, across)
     tall = sign * exact.nearest_root(height, square, grid)
 
+    words = [as_triple(sign * coordinate, square, 0) for coordinate in normal]
+    a, b, c = ((hi - nearest) + lo for (hi, lo, _), nearest in zip(words, (x, y, z), strict=True))
+    low = (a, b, c)
+    hi, lo, _ = as_triple(sign * height, square, grid)
+    height_low = (hi - tall) + lo
+
     def tiles(direction: exact.GridVector) -> tuple[Vector, float]:
         length = exact.dot(direction, direction)
         a, b, c = (exact.nearest_root(coordinate, length, 0) * tall / plane.tile for coordinate in direction)
         return (a, b, c), exact.nearest_root(exact.dot(direction, offset), length, grid) / plane.tile
 
     (across_step, across_0), (along_step, along_0) = tiles(across), tiles(along)
-    return _Ground((x, y, z), tall, across_step, across_0, along_step, along_0)
+    return _Ground((x, y, z), low, tall, height_low, across_step, across_0, along_step, along_0)

@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symrender_cg.build.library import Library
 from symrender_cg.run.kernel import Kernel, pointer_to
-
-_KEPT = 1 << 20
-"""Places that a thread keeps memory for: fresh memory costs more than a kernel's work on it."""
-
-_of_thread = threading.local()
+from symrender_cg.run.pool import SETTLED_PIXELS, Pool, Shared
+from symrender_cg.run.scratch import scratch
 
 
-def _scratch(size: int) -> NDArray[np.intp]:
-    """Memory for as many places, to be copied from before the thread asks again."""
-    if size > _KEPT:
-        return np.empty(size, dtype=np.intp)
-    kept: NDArray[np.intp] | None = getattr(_of_thread, "places", None)
-    if kept is None or kept.size < size:
-        kept = _of_thread.places = np.empty(size, dtype=np.intp)
-    return kept[:size]
+class SettlingRows(Shared):
+    """Rows of an image that a kernel settles; what it leaves over is collected in `left_over`, places of the image."""
+
+    __slots__ = ("arguments", "entry", "image", "left_over", "library")
+    least_pixels = SETTLED_PIXELS
+
+    def __init__(self, library: Library, entry: Any, arguments: tuple[Any, Any, Any, Any], image: NDArray[Any]) -> None:
+        self.library, self.entry, self.arguments, self.image = library, entry, arguments, image
+        self.left_over: list[NDArray[np.intp]] = []
+
+    def __call__(self, begin: int, end: int, /) -> None:
+        places = scratch((end - begin) * self.image.shape[1])
+        found = self.entry(*self.arguments, begin, end, self.library.ffi.cast("ptrdiff_t *", places.ctypes.data))
+        self.left_over.append(places[:found].copy())
+
+    def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
+        """Settles rows [begin, end) on so many threads, at least so many rows at a time."""
+        width = self.image.shape[1]
+        found = pool.listing_rows(self.entry, *self.arguments, begin, end, least, threads, width)
+        self.left_over.append(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +60,7 @@ class SettlingKernel(Kernel):
         """
         ffi = self.library.ffi
         held, width = image.shape
-        left_over = _scratch((end - begin) * width)
+        left_over = scratch((end - begin) * width)
         found = self._entry("rows")(
             pointer_to(image, f"{self._real} *", self.library, first=first),
             image.strides[0] // image.itemsize,
@@ -62,12 +72,37 @@ class SettlingKernel(Kernel):
         )
         return left_over[:found].copy()
 
+    def shared_rows(
+        self, image: NDArray[Any], numbers: Any, *, pixel: float, white: float, first: int, height: int
+    ) -> SettlingRows:
+        """As `settle_rows`, of an image of that height whose rows from `first` on the array holds; the threads of the
+        pool may draw them."""
+        grid = self.grid(image.shape[1], height, pixel, white)
+        bound = pointer_to(image, f"{self._real} *", self.library, first=first), image.strides[0] // image.itemsize
+        return SettlingRows(self.library, self._entry("rows"), (*bound, grid, numbers), image)
+
+    def settle_many(
+        self, images: NDArray[Any], numbers: NDArray[np.float64], grids: NDArray[Any]
+    ) -> Callable[[int, int], NDArray[np.intp]]:
+        """What writes rows [begin, end) of many images, counted through, as `onto_many` does; it returns the pixels
+        (k * height + row) * width + column that are not settled. Releases the GIL. All three arrays must be kept.
+        """
+        ffi, width = self.library.ffi, images.shape[2]
+        entry = self.onto_many(images, numbers, grids)
+
+        def rows(begin: int, end: int) -> NDArray[np.intp]:
+            left_over = scratch((end - begin) * width)
+            found = entry(begin, end, ffi.cast("ptrdiff_t *", left_over.ctypes.data))
+            return left_over[:found].copy()
+
+        return rows
+
     def settle_points(
         self, values: NDArray[Any], x: NDArray[np.float64], y: NDArray[np.float64], numbers: Any, *, white: float
     ) -> NDArray[np.intp]:
         """Writes the values at contiguous points; the indices of those that are not settled. Releases the GIL."""
         ffi = self.library.ffi
-        left_over = _scratch(values.size)
+        left_over = scratch(values.size)
         found = self._entry("points")(
             ffi.cast(f"{self._real} *", values.ctypes.data),
             ffi.cast("double *", x.ctypes.data),

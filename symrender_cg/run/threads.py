@@ -1,4 +1,5 @@
-"""Rows over threads: blocks of rows, taken in turn by the caller and by threads that sleep between calls.
+"""Rows over threads: a kernel's own rows by the pool in C, all others in blocks by threads of Python that sleep between
+calls.
 
 In: a function that draws rows [begin, end) and releases the GIL, a number of rows, a number of threads. Out: every row
 drawn once. Rows do not depend on one another, so any number of threads gives the same bits.
@@ -14,6 +15,7 @@ from functools import cache, lru_cache
 from threading import Lock, Thread
 
 from symrender_cg.errors import ArgumentError
+from symrender_cg.run.pool import Shared, pool_beside, processors
 
 PIXELS_A_THREAD = 1 << 16
 """Below this many pixels a thread costs more than it brings; the default number of threads grows with it."""
@@ -27,29 +29,57 @@ MOST_BLOCKS = 32
 MOST_PIXELS = 1 << 21
 """A block has no more pixels than this, also on one thread: what a kernel notes beside the image stays small."""
 
+LEAST_TURNS = 4
+"""Rows that threads take in fewer turns than this are not worth a word to another thread, let alone waking it."""
+
+MOST_ROUNDS = 4
+"""The pool in C is given at most so many times MOST_PIXELS at a time; in between an interrupt is seen."""
+
+MOST_ROWS = (1 << 31) - 1
+"""The pool in C counts rows as its kernels do."""
+
 Render = Callable[[int, int], object]
 
 
 def thread_count(threads: int | None, pixels: int) -> int:
     """How many threads to use: as asked, or by default one for every 65,536 pixels up to the processors at hand."""
     if threads is None:
-        return 1 if pixels < 2 * PIXELS_A_THREAD else max(1, min(_processors(), pixels // PIXELS_A_THREAD))
+        return 1 if pixels < 2 * PIXELS_A_THREAD else max(1, min(processors(), pixels // PIXELS_A_THREAD))
     if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
         raise ArgumentError(f"threads: {threads!r} is not a number of threads; expected a whole number from 1 up")
     return threads
 
 
-def over_rows(render: Render, height: int, threads: int, *, width: int = 1) -> None:
-    """Calls render(begin, end) for blocks of rows that cover [0, height), on that many threads with the caller's.
+def over_rows(render: Render, height: int, threads: int, *, width: int = 1, first: int = 0) -> None:
+    """Calls render(begin, end) for blocks of rows that cover [first, first + height), on that many threads with the
+    caller's.
 
-    Blocks shrink towards the end: the caller begins with a large one while the others wake, and all end together. A
-    thread that wakes late finds nothing left to do, and is not waited for. The first error of any thread is raised in
-    the caller, when no thread draws any more; blocks that nobody has begun are then left out.
+    A kernel's own rows are drawn by the pool in C (`pool`), everything else by threads of Python. Blocks shrink towards
+    the end, so that all end together. A thread that wakes late finds nothing left to do, and is not waited for. The
+    first error of any thread is raised in the caller, when no thread draws any more; blocks that nobody has begun are
+    then left out.
     """
-    if threads == 1 and height * width <= MOST_PIXELS:
-        render(0, height)
+    pixels = height * width
+    if threads == 1 and pixels <= MOST_PIXELS:
+        render(first, first + height)
         return
+    if threads > 1 and first + height <= MOST_ROWS and isinstance(render, Shared):
+        if pixels < LEAST_TURNS * render.least_pixels:
+            render(first, first + height)
+            return
+        found = pool_beside(render.library)
+        if found is not None:
+            least = -(-render.least_pixels // width)
+            if pixels <= MOST_PIXELS:
+                render.share(found, first, first + height, least, threads)
+                return
+            some = max(1, min(threads, MOST_ROUNDS) * MOST_PIXELS // width)
+            for begin in range(first, first + height, some):
+                render.share(found, begin, min(begin + some, first + height), min(some, least), threads)
+            return
     turns = block_ends(height, width, threads)
+    if first:
+        turns = tuple((first + begin, first + end) for begin, end in turns)
     if threads == 1 or len(turns) == 1:
         for begin, end in turns:
             render(begin, end)
@@ -194,10 +224,6 @@ class _Pool:
 @cache
 def _pool() -> _Pool:
     return _Pool()
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 if hasattr(os, "register_at_fork"):

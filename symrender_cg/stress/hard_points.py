@@ -19,7 +19,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from msgspec import structs
 
-from symrender_cg.reference import points
+from symrender_cg.reference import hard_places, points
 from symrender_cg.reference.check_scene import edge_points
 from symrender_cg.scene import Phong, PointLight, Scene
 
@@ -44,9 +44,9 @@ def hard_points(frame: Scene, count: int, seed: int) -> tuple[HardPoints, ...]:
     pairs = _every_kth(list(_pairs(frame)))
     spheres = _every_kth(list({id(pair.spheres[0]): pair for pair in pairs}.values()))
     sets = [HardPoints("image", list(zip(x.tolist(), y.tolist(), strict=True)))]
-    sets.append(HardPoints("outlines", _pooled(points.near_silhouette, spheres, count, seed)))
-    sets.append(HardPoints("terminators", _pooled(points.near_terminator, pairs, count, seed)))
-    sets.append(HardPoints("highlights", _pooled(points.near_highlight, pairs, count, seed)))
+    sets.append(HardPoints("outlines", _pooled(hard_places.near_silhouette, spheres, count, seed)))
+    sets.append(HardPoints("terminators", _pooled(hard_places.near_terminator, pairs, count, seed)))
+    sets.append(HardPoints("highlights", _pooled(hard_places.near_highlight, pairs, count, seed)))
     for edge in edge_points(frame, 1.0, count, seed):
         found = list(zip(edge.x.tolist(), edge.y.tolist(), strict=True))
         sets.append(HardPoints(edge.where.replace("near ", "edges: "), found))

@@ -19,7 +19,7 @@ from typing import Final, TypeAlias
 
 from flint import arb, ctx
 
-from symrender_cg.reference.points import whole_numbers
+from symrender_cg.reference.camera_numbers import whole_numbers
 from symrender_cg.scene import Vector
 from symrender_cg.stress.cases import Dice, Inputs
 

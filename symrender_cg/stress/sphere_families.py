@@ -10,7 +10,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from symrender_cg.reference.points import exact_hit_test, frame_numbers
+from symrender_cg.reference.camera_numbers import frame_numbers
+from symrender_cg.reference.decisions import exact_hit_test
 from symrender_cg.scene import Camera, Phong, PointLight, Scene, Sphere, Vector
 from symrender_cg.stress.cases import Dice, Drawn, Inputs
 from symrender_cg.stress.searches import disc, edge_in_row, inside_point, outline_radius, outline_x

@@ -37,4 +37,10 @@ static inline int whole_vectors(int count)
     return (count + 15) & ~15;
 }
 
+/* count, down to whole vectors */
+static inline int vectors_begin(int count)
+{
+    return count & ~15;
+}
+
 #endif

@@ -193,6 +193,13 @@ static inline double range_light_gap2(range x, range y, range z)
     return gap * gap;
 }
 
+/* The largest |v| of a vector. */
+static inline double range_length(range x, range y, range z)
+{
+    const double a = range_size(x), b = range_size(y), c = range_size(z);
+    return sqrt(a * a + b * b + c * c) * (1.0 + 0x1p-48);
+}
+
 /* a + b. Terms of one sign keep their relative errors; others may cancel. Of squares, the roots add as in
  * |sqrt((p + d)^2 + (q + e)^2) - sqrt(p^2 + q^2)| <= sqrt(d^2 + e^2) (Minkowski). */
 static inline range range_sum(number_format format, range a, range b)
@@ -408,6 +415,32 @@ static inline range range_power_of_cosine(number_format format, range cos2, rang
     power.relative = own_relative;
     power.low_relative = format == FLOAT64 ? 0.0 : 0x1p-50;
     return power;
+}
+
+/* cos2^h by squaring, step by step as whole_power.h computes it, h >= 4. Where r.v < 0 the same power stands for 0: there
+ * cos2 is computed as less than its errors squared. */
+static inline range range_whole_power(number_format format, range cos2, int h)
+{
+    const double at_zero = 2.0 * (cos2.root + sqrt(cos2.absolute));
+    range square = cos2;
+    for (; h % 2 == 0; h /= 2)
+        square = range_within(range_square(format, square), 0.0, 1.0);
+    range power = square;
+    while ((h /= 2) > 0) {
+        square = range_within(range_square(format, square), 0.0, 1.0);
+        if (h % 2 == 1)
+            power = range_within(range_product(format, power, square), 0.0, 1.0);
+    }
+    power.absolute += at_zero < 1.0 ? at_zero * at_zero : INFINITY;
+    return power;
+}
+
+/* The power of a cosine, by squaring where `half` is not 0. */
+static inline range range_lobe(number_format format, range cos2, range sin2, range exponent, int half,
+    double own_relative, double own_absolute)
+{
+    return half > 0 ? range_whole_power(format, cos2, half)
+                    : range_power_of_cosine(format, cos2, sin2, exponent, own_relative, own_absolute);
 }
 
 /* One of the two. That it is the right one is not counted here: a pixel where it may not be asks for more. */

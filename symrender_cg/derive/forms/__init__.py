@@ -12,14 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from symrender_cg.derive.forms import discriminant, light, normal, silhouette
+from symrender_cg.derive.forms import discriminant, highlight, inner_products, light, normal, silhouette
 from symrender_cg.derive.forms.form import Claim, Form
 from symrender_cg.derive.forms.light import CosinePower
 from symrender_cg.derive.program import Definition, ImageProgram
 
 __all__ = ["FORMS", "Claim", "CosinePower", "Form", "apply", "form"]
 
-FORMS: tuple[Form, ...] = (*discriminant.FORMS, *silhouette.FORMS, *normal.FORMS, *light.FORMS)
+FORMS: tuple[Form, ...] = (
+    *discriminant.FORMS,
+    *silhouette.FORMS,
+    *normal.FORMS,
+    *highlight.FORMS,
+    *light.FORMS,
+    *inner_products.FORMS,
+)
 
 
 def form(name: str) -> Form:

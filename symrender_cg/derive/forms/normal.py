@@ -44,11 +44,14 @@ def _off_axis_normal(_: ImageProgram) -> tuple[Definition, ...]:
 def _any_normal(_: ImageProgram) -> tuple[Definition, ...]:
     x, y, focal, facing, inv_d2 = symbols("x y focal facing inv_d2")
     c_x, c_y, c_z = symbols("cross_x cross_y cross_z")
+    foot = (-c_y * focal - c_z * y, c_x * focal + c_z * x, c_x * y - c_y * x)
     return (
         _inverse(),
-        Definition("n_x", (-c_y * focal - c_z * y - facing * x) * inv_d2, _NORMAL, _FOOT),
-        Definition("n_y", (c_x * focal + c_z * x - facing * y) * inv_d2, _NORMAL),
-        Definition("n_z", (c_x * y - c_y * x + facing * focal) * inv_d2, _NORMAL),
+        *(Definition(f"foot_{axis}", foot[i], _NORMAL, _FOOT if i == 0 else "") for i, axis in enumerate("xyz")),
+        *(
+            Definition(f"n_{axis}", (S(f"foot_{axis}") - facing * ray) * inv_d2, _NORMAL)
+            for axis, ray in zip("xyz", (x, y, -focal), strict=True)
+        ),
     )
 
 

@@ -11,6 +11,7 @@ from symrender_cg.derive.symbols import symbols
 
 _SILHOUETTE = "silhouette"
 _RAY = "ray and sphere"
+_EDGE = "disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette"
 
 
 def _centred_span(_: ImageProgram) -> tuple[Definition, ...]:
@@ -102,10 +103,28 @@ def _facing() -> tuple[Definition, ...]:
             "facing2",
             S("alpha") * S("chord"),
             _RAY,
-            "disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette",
+            _EDGE,
         ),
         Definition("facing", sp.sqrt(S("facing2")), _RAY, "-n.D, how far the surface faces the ray: root / R"),
     )
+
+
+def _middle_facing(_: ImageProgram) -> tuple[Definition, ...]:
+    focal, alpha, s = symbols("focal alpha s")
+    return (
+        Definition("middle_s", S("rho2") / 2, _SILHOUETTE, "where the angle of incidence is 45 degrees"),
+        Definition("facing2_middle", focal**2 - alpha * s, _RAY, "disc / R^2 where that takes little from f^2"),
+        Definition("facing2_edge", alpha * S("chord"), _RAY, _EDGE),
+        Definition(
+            "facing2",
+            sp.Piecewise((S("facing2_middle"), S("middle_s") - s > 0), (S("facing2_edge"), True)),
+            _RAY,
+        ),
+    )
+
+
+def _middle_claims() -> tuple[Claim, ...]:
+    return tuple(Claim(S(f"facing2_{where}") * S("radius") ** 2, S("disc")) for where in ("middle", "edge"))
 
 
 def _facing_claims() -> tuple[Claim, ...]:
@@ -143,6 +162,15 @@ def _any_sphere_claims() -> tuple[Claim, ...]:
 
 
 FORMS: tuple[Form, ...] = (
+    Form(
+        "middle_facing",
+        _middle_facing,
+        "five of six roundings of the discriminant, where it does not cancel",
+        "disc / R^2 = f^2 - alpha s, and the same as a product of two differences",
+        _middle_claims,
+        off_axis=False,
+        front_test=False,
+    ),
     Form(
         "centred_span",
         _centred_span,

@@ -24,10 +24,11 @@ from typing import Final, TypeVar
 
 from flint import arb, ctx, fmpz
 
+from symrender_cg.reference.camera_numbers import FrameNumbers, frame_numbers, whole_numbers
 from symrender_cg.reference.oracle.one_sphere_exact import Cast, added_light
 from symrender_cg.reference.oracle.rounding import Rounding
 from symrender_cg.reference.oracle.whole import primary_directions
-from symrender_cg.reference.points import FloatArray, FrameNumbers, frame_numbers, whole_numbers
+from symrender_cg.reference.points import FloatArray
 from symrender_cg.scene import PointLight, Scene
 
 FIRST_BITS: Final = 192

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from flint import arb, fmpz
 
-from symrender_cg.reference.points import FrameNumbers
+from symrender_cg.reference.camera_numbers import FrameNumbers
 
 
 @dataclass(frozen=True, slots=True)

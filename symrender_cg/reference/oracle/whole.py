@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from flint import arb, fmpq, fmpz
 
+from symrender_cg.reference.camera_numbers import whole_numbers
 from symrender_cg.reference.oracle.near import Near
-from symrender_cg.reference.points import FloatArray, whole_numbers
+from symrender_cg.reference.points import FloatArray
 from symrender_cg.scene import DirectionalLight, Phong, Plane, PointLight, Scene
 
 Number: TypeAlias = Any
