@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.peers.case import Arrangements, Case, Factory, Grid, Numbers, Render, image_grid
 
@@ -22,38 +21,9 @@ def level(accuracy: str, form: str, *, bake: bool) -> Factory:
     def factory(case: Case, threads: int) -> Arrangements:
         if case.format != form or (bake and not case.baked):
             return {}
-        by = "stable's kernel" if _hands_over(case, accuracy, bake) else "render_image"
-        return {by: partial(_draw, case, accuracy, bake, threads)}
+        return {"render_image": partial(_draw, case, accuracy, bake, threads)}
 
     return factory
-
-
-def double_alone(case: Case, threads: int) -> Arrangements:
-    """The kernel of `double` where render_image does not take it, because it would break the promise of the level."""
-    if case.format != "float64" or not _hands_over(case, "double", False):
-        return {}
-
-    def draw(grid: Grid) -> Render:
-        from symrender_cg.pipeline import draw as bound
-
-        if grid != image_grid(case.numbers, grid.size):
-            return _draw(case, "double", False, threads, grid)
-        drawing = bound(scene_of(case.numbers, grid), "double", size=(grid.size, grid.size))
-        out = np.empty((grid.size, grid.size), case.dtype)
-
-        def render() -> NDArray[Any]:
-            drawing.rows(out, 0, grid.size)
-            return out
-
-        return render
-
-    return {"double's kernel": draw}
-
-
-def _hands_over(case: Case, accuracy: str, bake: bool) -> bool:
-    from symrender_cg.run.levels import hands_over
-
-    return accuracy == "double" and not bake and hands_over(scene_of(case.numbers))
 
 
 literal = level("literal", "float64", bake=False)

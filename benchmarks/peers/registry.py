@@ -69,7 +69,6 @@ ENTRIES: Final = (
     Entry("C, -O3 -ffast-math", "benchmarks.peers.c_loop:fast_math_loop", threads=True),
     _ours("literal", "literal"),
     _ours("double", "double", again=True),
-    Entry("double, no promise", "benchmarks.peers.ours:double_alone", ours=True),
     _ours("double, baked", "double_baked"),
     _ours("single", "single"),
     _ours("single, baked", "single_baked"),
