@@ -278,7 +278,7 @@ def asked_for(name: str) -> set[str]:
     tree = c99.environment().parse((templates() / name).read_text(encoding="utf-8"))
     included = {str(other) for other in meta.find_referenced_templates(tree)}
     own = {macro.name for macro in tree.find_all(jinja2.nodes.Macro)}
-    targets = [entry.target for entry in tree.find_all(jinja2.nodes.Assign)]
+    targets = [entry.target for entry in tree.find_all((jinja2.nodes.Assign, jinja2.nodes.AssignBlock))]
     named = [name for target in targets for name in (target, *target.find_all(jinja2.nodes.Name))]
     own |= {name.name for name in named if isinstance(name, jinja2.nodes.Name)}
     own |= {name for entry in tree.find_all(jinja2.nodes.FromImport) for name in entry.names if isinstance(name, str)}

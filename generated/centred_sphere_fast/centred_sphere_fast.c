@@ -3,7 +3,7 @@
  * Generated from the formula; do not edit. Regenerate with:
  *     python -m symrender_cg build chapter1 --accuracy fast
  *
- * promise  right to within one grey level of 256 for n <= 1000; hit or miss never wrong
+ * promise  right to within one grey level of 256, under the conditions of double; hit or miss never wrong
  * in       diffuse term
  *          specular term
  * out      sphere off the axis: the centre is the point looked at: disc depends on x^2 + y^2 alone

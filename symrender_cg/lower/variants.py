@@ -165,7 +165,7 @@ class Variant:
 VARIANTS: tuple[Variant, ...] = (
     Variant(
         "fast",
-        "right to within one grey level of 256 for n <= 1000; hit or miss never wrong",
+        "right to within one grey level of 256, under the conditions of double; hit or miss never wrong",
         "float32",
         (*_STABLE_FORMS, "complement"),
         exact=True,
