@@ -64,8 +64,8 @@ def overheads(rounds: int, seed: int) -> list[Row]:
             image = np.empty(drawing.shape(side, side), drawing.dtype)
             write = drawing.onto(image)
             calls = {
-                "call": warm_sample(lambda scene=scene, side=side: render_image(scene, side, side)),  # type: ignore[misc]
-                "kernel": warm_sample(lambda write=write, side=side: write(0, side)),  # type: ignore[misc]
+                "call": warm_sample(partial(render_image, scene, side, side)),
+                "kernel": warm_sample(partial(write, 0, side)),
             }
             found = take_turns(calls, rounds, seed, lambda _: None)
             call, kernel = (1e3 * np.array(found[key]) for key in ("call", "kernel"))
@@ -88,11 +88,11 @@ def gains(rounds: int, seed: int) -> list[Row]:
             def python(write: Callable[[int, int], object] = write, side: int = side) -> None:
                 over_rows(lambda begin, end: write(begin, end), side, 2, width=side)
 
-            calls = {
+            calls: dict[str, Callable[[], float]] = {
                 "python": warm_sample(python),
-                "one": warm_sample(lambda s=scene, n=side, o=images[0]: render_image(s, n, n, threads=1, out=o)),  # type: ignore[misc]
-                "two": warm_sample(lambda s=scene, n=side, o=images[0]: render_image(s, n, n, threads=2, out=o)),  # type: ignore[misc]
-                "own": lambda s=scene, n=side, o=images: _two_at_once(s, n, o),  # type: ignore[misc]
+                "one": warm_sample(partial(render_image, scene, side, side, threads=1, out=images[0])),
+                "two": warm_sample(partial(render_image, scene, side, side, threads=2, out=images[0])),
+                "own": partial(_two_at_once, scene, side, images),
             }
             found = {key: np.array(values) for key, values in take_turns(calls, rounds, seed, lambda _: None).items()}
             gained = (found["one"] / found["two"], found["one"] / found["python"], 2.0 * found["one"] / found["own"])
@@ -173,8 +173,9 @@ def scene_batches(rounds: int, seed: int) -> list[Row]:
     for name in BATCHED:
         scene = Scene.builtin(name)
         for what, far in (("lights.0.position", 0.25), ("spheres.0.center", 0.02)):
-            start = scene.lights[0] if what.startswith("lights") else scene.spheres[0]
-            place = np.array(start.position if isinstance(start, PointLight) else start.center)  # type: ignore[union-attr]
+            light = scene.lights[0]
+            assert isinstance(light, PointLight), "the lights of these scenes have a position"
+            place = np.array(light.position if what.startswith("lights") else scene.spheres[0].center)
             for side, count in ((64, 200), (256, 40)):
                 images = np.empty((count, side, side))
 

@@ -15,6 +15,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from random import Random
 from typing import Any, Final
 
@@ -41,7 +42,7 @@ WAYS: Final = (
     *("fast_coarse_fused", "fast_fused", "fast", "single_complement_fused", "single_complement", "single_fused"),
     *("single", "double_complement_fused", "double_complement", "double_fused", "double"),
 )
-REQUESTS: Final[tuple[dict[str, float], ...]] = (
+REQUESTS: Final[tuple[dict[str, Any], ...]] = (
     *({"max_error": error} for error in (1e-3, 1e-6, 1e-9, 1e-14, 1e-15)),
     *({"max_ulp": ulp} for ulp in (64.0, 4.0, 0.5)),
     *({"bits": bits} for bits in (8.0, 16.0)),
@@ -114,7 +115,7 @@ def measure_promises(scenes: int, others: int, seed: int, told: Callable[[str], 
         scene = several(of) if number % 4 == 3 else one_sphere(of)
         for request in REQUESTS:
             try:
-                found = choose(scene, **request)  # type: ignore[arg-type]
+                found = choose(scene, **request)
             except AccuracyError:
                 kinds["refused"] += 1
                 continue
@@ -188,7 +189,7 @@ def _shares(scene: Scene, number: int) -> list[tuple[str, float, float]]:
     found = []
     for way in ways:
         seen, result = bench.errors[way.name], way.variant.result
-        fresh = errors_of(lambda x, y, name=way.name: evaluate(scene, x, y, accuracy=name), sample)  # type: ignore[misc]
+        fresh = errors_of(partial(evaluate, scene, accuracy=way.name), sample)
         absolute = measured_bound(seen, bench.top, result, 0.0, "absolute")
         ulp = measured_bound(seen, bench.top, result, 0.0, "ulp")
         if absolute < 1e100:

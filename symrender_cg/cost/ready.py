@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from dataclasses import field as default
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,10 +30,10 @@ from symrender_cg.pipeline import (
     recipe_of,
     translate,
 )
-from symrender_cg.run.certify import settle_image
 from symrender_cg.run.levels import drawn_as, job_of
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.run.render import evaluate, render_image
+from symrender_cg.run.settled_rows import SettledRows
 from symrender_cg.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -166,8 +167,8 @@ def drawer(way: Way, scene: Scene, size: tuple[int, int], *, cache: Place = None
     if not _changed(way):
         job = job_of(scene, way.accuracy, way.target, clip=True, bake=way.bake, cache=cache, threads=1)
         if job is not None:
-            settled = job
-            return lambda: settle_image(settled, width, height)
+            settled = SettledRows(job, width, height)
+            return partial(settled.draw, np.empty(settled.shape, settled.dtype), threads=1)
     drawing = _drawing(way, scene, (width, height), clip=True, cache=cache)
     image = np.empty(drawing.shape(height, width), drawing.dtype)
     if way.side == 1:
