@@ -9,7 +9,7 @@ Never here: a scene that is refused, or another kernel; both are for the plan.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from symrender_cg.lower.variants import MOST_ROUNDOFFS
 from symrender_cg.plan.effects import FARTHEST_ASIDE
 from symrender_cg.plan.plan import Plan
+from symrender_cg.run.framed import framed_half_heights
 from symrender_cg.run.levels import MOST_SHININESS
 from symrender_cg.run.numbers import numbers_of
-from symrender_cg.run.parameters import Path
-from symrender_cg.run.steep import least_roundoffs, roundoffs
-from symrender_cg.scene import Gradient, PointLight, Scene, Sphere
+from symrender_cg.run.parameters import Path, Sets
+from symrender_cg.run.stacking import stack_of
+from symrender_cg.run.steep import boxes_drawn, least_roundoffs, roundoffs
+from symrender_cg.scene import Gradient, PointLight, Scene
 from symrender_cg.scene.camera_frame import is_in_frame
-from symrender_cg.scene.framing import framed_half_height
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -48,6 +49,39 @@ _INPUTS: Mapping[Path, str] = {
     ("background",): "background",
 }
 """Which number of the derivation a path is; a name that ends in _ has three, for x, y and z."""
+
+
+def inputs_for(scene: Scene, sets: Sets, looked_at: Sequence[int]) -> dict[str, Floats] | None:
+    """Columns of the first of those sets by the names of the derivation's inputs, in the frames of their cameras; with
+    `eye` and `half_height` where cameras turn. None where something else of the scene changes.
+
+    scene: the first of the sets.
+    """
+    if is_in_frame(scene.camera):
+        if sets.scenes:
+            found = inputs_of_scenes([sets.scenes[index] for index in looked_at])
+        else:
+            found = inputs_of({path: column[looked_at] for path, column in sets.columns.items()})
+        if found and len(found.get("radius", looked_at)) > 1:
+            return found
+    return _inputs_in_frames(scene, sets, looked_at)
+
+
+def _inputs_in_frames(scene: Scene, sets: Sets, looked_at: Sequence[int]) -> dict[str, Floats] | None:
+    if len(scene.spheres) != 1 or len(scene.lights) != 1 or scene.plane is not None or scene.channels != 1:
+        return None
+    read = stack_of(scene, sets, looked_at) if isinstance(scene.lights[0], PointLight) else None
+    if read is None or read[0].background is None or "reflect" in read[0].changes:
+        return None
+    stack, members = read
+    count = next((k for k, index in enumerate(members) if index != looked_at[k]), len(members))
+    found = {"eye": stack.eye, "half_height": stack.half_height, "radius": stack.radius[:, 0]}
+    found |= {"shininess": stack.shininess[:, 0], "light_intensity": stack.intensity[:, 0, 0]}
+    found |= {"background": stack.background[:, 0]} if stack.background is not None else {}
+    found |= {f"k_{name}": getattr(stack, name)[:, 0, 0] for name in ("ambient", "diffuse", "specular")}
+    for k, axis in enumerate("xyz"):
+        found |= {f"center_{axis}": stack.center[:, 0, k], f"light_{axis}": stack.place[:, 0, k]}
+    return {name: column[:count] for name, column in found.items()}
 
 
 def inputs_of(columns: Mapping[Path, NDArray[Any]]) -> dict[str, Floats] | None:
@@ -103,6 +137,20 @@ def _unlike(scene: Scene) -> tuple[object, ...]:
     return scene.camera, light.attenuation, material.gate_specular, mirror, scene.shadows, scene.max_bounces
 
 
+class Alike(NamedTuple):
+    """Sets of one kernel.
+
+    numbers       (sets, inputs) as the kernel takes them
+    half_heights  (sets,) of their frames
+    edges         (sets, 4) of the boxes that another kernel draws in their images (symrender_cg.run.steep.boxes_drawn),
+                  NaN for none
+    """
+
+    numbers: Floats
+    half_heights: Floats
+    edges: Floats
+
+
 def rows_alike(
     scene: Scene,
     found: Plan,
@@ -111,12 +159,13 @@ def rows_alike(
     order: tuple[str, ...],
     *,
     handed: bool = False,
-) -> tuple[Floats, Floats]:
-    """(numbers, half_heights) of the first sets that have the kernel of the scene, which is that of the first set.
+    boxed: bool = False,
+) -> Alike:
+    """The first sets that have the kernel of the scene, which is that of the first set; at least that one.
 
-    inputs: columns of the sets, the scene's own first. order: the kernel's inputs. numbers has shape (sets, inputs);
-    half_heights those of the frames. At least one set, for the scene itself.
+    inputs: columns of the sets, the scene's own first. order: the kernel's inputs.
     handed: `double` hands the scene over, see symrender_cg.run.levels.hands_over.
+    boxed: sets are wanted, too, of which `double` has another kernel draw a box; all edges are NaN where it is not so.
     """
     frame = found.scene
     numbers = numbers_of(frame)
@@ -127,26 +176,35 @@ def rows_alike(
     plain = found.arrangement is None and found.scene is found.given and material is not None
     changing = "background" in inputs and bool((inputs["background"] != inputs["background"][0]).any())
     mirrors = material is not None and material.reflect != 0.0 and changing
-    if not plain or mirrors or not is_in_frame(scene.camera) or found.needs("front_test"):
+    turned = "eye" in inputs
+    if not plain or mirrors or not (turned or is_in_frame(scene.camera)) or found.needs("front_test"):
         count = 1
     every = {name: np.broadcast_to(np.float64(value), count) for name, value in numbers.items()}
     half_heights = np.full(count, half_height)
     if count > 1:
-        assert material is not None, "there is one sphere"
         every |= {name: column[:count] for name, column in inputs.items()}
-        sure = _surely(every, numbers, accuracy, gated=material.gate_specular, handed=handed)
+    edges = boxes_drawn(every) if boxed else np.full((count, 4), np.nan)
+    if count > 1:
+        assert material is not None, "there is one sphere"
+        has_box = ~np.isnan(edges[:, 0])
+        sure = _surely(every, numbers, accuracy, gated=material.gate_specular, handed=handed, has_box=has_box)
         sure[0] = True
         count = int(np.argmin(sure)) if not sure.all() else count
-        if scene.camera.half_height is None and not {"radius", "center_x", "center_y", "center_z"}.isdisjoint(inputs):
+        if turned:
+            half_heights = inputs["half_height"][:count]
+        elif scene.camera.half_height is None and not {"radius", "center_x", "center_y", "center_z"}.isdisjoint(inputs):
             half_heights = _framed(every, count)
-        sure = half_heights[:count] <= MOST_RADII * numbers["eye"]
+        eye = every["eye"][:count]
+        sure = (
+            (half_heights[:count] <= MOST_RADII * eye) & (half_heights[:count] * MOST_RADII >= eye) & (eye >= SMALLEST)
+        )
         sure[0] = True
         count = int(np.argmin(sure)) if not sure.all() else count
-    return np.stack([every[name][:count] for name in order], axis=1), half_heights[:count]
+    return Alike(np.stack([every[name][:count] for name in order], axis=1), half_heights[:count], edges[:count])
 
 
 def _surely(
-    every: Mapping[str, Floats], first: Mapping[str, float], accuracy: str, *, gated: bool, handed: bool
+    every: Mapping[str, Floats], first: Mapping[str, float], accuracy: str, *, gated: bool, handed: bool, has_box: Bools
 ) -> Bools:
     """Which sets have a scene, a plan of the same effects as the first, and the same level's kernel."""
     center, light = ([every[f"{what}_{axis}"] for axis in "xyz"] for what in ("center", "light"))
@@ -172,14 +230,13 @@ def _surely(
         if accuracy == "double":
             signs = (specular > 0.0) & (gated | ((shininess > 0.0) & (shininess < 1.0)))
             above = least_roundoffs(every) >= (1.0 + ROOM) * MOST_ROUNDOFFS
-            below = roundoffs(every) <= (1.0 - ROOM) * MOST_ROUNDOFFS
+            found = roundoffs(every)
+            below = (found <= (1.0 - ROOM) * MOST_ROUNDOFFS) | (has_box & (found >= (1.0 + ROOM) * MOST_ROUNDOFFS))
             sure &= (signs | above) if handed else (~signs & below)
     return np.asarray(sure, dtype=np.bool_)
 
 
 def _framed(every: Mapping[str, Floats], count: int) -> Floats:
     """The half-heights that frame each set's sphere."""
-    places = zip(*(every[f"center_{axis}"][:count].tolist() for axis in "xyz"), strict=True)
-    eyes, radii = every["eye"][:count].tolist(), every["radius"][:count].tolist()
-    framed = (framed_half_height(e, (Sphere(c, r),)) for e, c, r in zip(eyes, places, radii, strict=True))
-    return np.fromiter(framed, dtype=np.float64, count=count)
+    center = np.stack([every[f"center_{axis}"][:count] for axis in "xyz"], axis=1)
+    return framed_half_heights(every["eye"][:count], center[:, np.newaxis], every["radius"][:count, np.newaxis])

@@ -67,7 +67,7 @@ def _ground(frame: Scene) -> dict[str, Any]:
     tile = exact.on_grid(plane.tile, tile_grid)
     ground = [as_triple(c, square, 0) for c in normal] + [as_triple(height, square, grid)]
     tiles = []
-    for direction in (across, along):
+    for direction in (across, along) if plane.checker is not None else ():
         length = exact.dot(direction, direction) * tile * tile
         tiles += [as_triple(c * height, length * square, grid - tile_grid) for c in direction]
         tiles.append(as_triple(exact.dot(direction, offset), length, grid - tile_grid))

@@ -190,5 +190,15 @@ def _ground(frame: Scene) -> _Ground:
         a, b, c = (exact.nearest_root(coordinate, length, 0) * tall / plane.tile for coordinate in direction)
         return (a, b, c), exact.nearest_root(exact.dot(direction, offset), length, grid) / plane.tile
 
+    if plane.checker is None:
+        nowhere = 0.0, 0.0, 0.0
+        return _Ground((x, y, z), low, tall, height_low, nowhere, 0.0, nowhere, 0.0)
     (across_step, across_0), (along_step, along_0) = tiles(across), tiles(along)
     return _Ground((x, y, z), low, tall, height_low, across_step, across_0, along_step, along_0)
+
+
+def ground_numbers(frame: Scene) -> dict[str, Any]:
+    """What the plane of a scene adds to its numbers: those of the plane itself, and as `radius` and `radius_low` the
+    height of the eye above it, of which each of its materials has one entry."""
+    ground = _ground(frame)
+    return {"radius": ground.height, "radius_low": ground.height_low} | _plane(ground)
