@@ -221,22 +221,6 @@ def _function(value: sp.Expr, names: tuple[str, ...]) -> Callable[..., Any]:
     return found
 
 
-def test_no_hit_lies_outside_the_outline_that_is_rounded_more_coarsely() -> None:
-    """outline_left <= x_left and x_right <= outline_right, by more than what float64 loses on the way."""
-    of, tried = part("span"), 0
-    with mpmath.workdps(60):
-        for given in random_spheres(300):
-            numbers = evaluated(of, given)
-            if mpmath.im(numbers["x_left"]) != 0:
-                continue
-            tried += 1
-            spread = abs(numbers["outline_left"]) + abs(numbers["outline_right"])
-            room = min(numbers["x_left"] - numbers["outline_left"], numbers["outline_right"] - numbers["x_right"])
-            assert room > spread * mpmath.mpf(2) ** -51
-            assert room < numbers["most_half"] / numbers["alpha"]
-    assert tried > 200
-
-
 # -------------------------------------------------------------------------------------------------------------- light
 
 P, LAMP, W, N, MIRROR = (vector(stem) for stem in ("p", "lamp", "w", "n", "mirror"))

@@ -233,12 +233,15 @@ def test_the_text_does_not_depend_on_the_number_of_spheres(accuracy: str) -> Non
 
 
 VECTOR_LOOPS = (
+    "span_strip_of",
     "span_surface",
     "near_surface",
     "plane_surface",
     "reach",
     "shade_matte",
     "shade_glossy",
+    "raise_lobes",
+    "finish_glossy",
     "fade",
     "cast_shadows",
     "accumulate",

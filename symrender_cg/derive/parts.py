@@ -176,10 +176,9 @@ def sphere_part(*, near: bool, mirrored: bool, in_full: bool = False) -> Part:
                 "the rows that meet the silhouette: row_disc = 0",
             ),
             Definition("row_high", focal * (depth * offset_y + half) / S("height2"), silhouette),
-            *_outline(),
         ]
     results: tuple[str, ...] = ("facing2", "d_dot_d", "n_x", "n_y", "n_z", "hit_distance")
-    results += ("before_eye",) if near else ("x_left", "x_right", "row_low", "row_high", *OUTLINE)
+    results += ("before_eye",) if near else ("x_left", "x_right", "row_low", "row_high")
     results += ("mirror_x", "mirror_y", "mirror_z", "inv_d2") if mirrored else ()
     definitions = _cut((*program.definitions, *more), results)
     return Part(
@@ -189,37 +188,6 @@ def sphere_part(*, near: bool, mirrored: bool, in_full: bool = False) -> Part:
         _PRIMARY,
         ends=None if near else ("x_left", "x_right"),
         second_words=(*_xyz("n"), *_xyz("mirror")) if in_full else (),
-    )
-
-
-OUTLINE = ("outline_left", "outline_right")
-"""Ends of a row's span with room for the rounding of plain float64: no hit lies outside them."""
-
-_ROOM = sp.Rational(1, 2**48)
-
-
-def _outline() -> tuple[Definition, ...]:
-    """The span's ends as x_left and x_right, each difference widened by 2^-48 of what it is the difference of."""
-    section = "outline"
-    y, focal, depth, alpha = symbols("y focal depth alpha")
-    offset_x, offset_y = symbols("offset_x offset_y")
-    gap = depth * y - offset_y * focal
-    middle = offset_x * (depth * focal + offset_y * y)
-    farthest = sp.Abs(offset_x) * (depth * focal + sp.Abs(offset_y) * sp.Abs(y))
-    return (
-        Definition("gap_room", _ROOM * (depth * sp.Abs(y) + sp.Abs(offset_y) * focal), section, "what rounding may do"),
-        Definition("plain_gap", sp.Abs(gap), section, "|row_gap| in plain float64"),
-        Definition("less_gap", S("plain_gap") - S("gap_room"), section),
-        Definition("least_gap", sp.Max(0, S("less_gap")), section, "at most |row_gap|"),
-        Definition("most_disc", (1 + _ROOM) * (y**2 + focal**2) - S("least_gap") ** 2, section, "at least row_disc"),
-        Definition(
-            "most_half",
-            (1 + _ROOM) * sp.sqrt((alpha + offset_x**2) * sp.Max(0, S("most_disc"))) + _ROOM * farthest,
-            section,
-            "at least row_half, and the rounding of the middle",
-        ),
-        Definition("outline_left", (middle - S("most_half")) / alpha, section, "every hit lies between these"),
-        Definition("outline_right", (middle + S("most_half")) / alpha, section),
     )
 
 

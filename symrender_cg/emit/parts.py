@@ -29,12 +29,11 @@ class Carried:
 class PrimaryBodies:
     """A part that takes the eye's ray: structures for frame, sphere and row, and bodies for what a pixel needs.
 
-    Results `apart` are a row's too, but have a function of their own.
+    The two ends of a row's span are a row's too, but have a function of their own.
     """
 
-    def __init__(self, program: KernelProgram, stored: Sequence[str], apart: Sequence[str] = ()) -> None:
+    def __init__(self, program: KernelProgram, stored: Sequence[str]) -> None:
         self.program = program
-        self.apart = frozenset(apart)
         self.name = program.name
         self.format = {step.name: step.format for step in program.steps}
         rates = program.input_rates()
@@ -52,9 +51,10 @@ class PrimaryBodies:
         """The statements at the rate of a pixel that lead to the named quantities."""
         return body(closure(self.program.at("pixel"), names), self._places("pixel"), indent)
 
-    def outline(self) -> list[str]:
-        """The statements at the rate of a row that lead to the results apart."""
-        return body(closure(self.program.at("row"), self.apart), self._places("row"))
+    @property
+    def ends(self) -> list[str]:
+        """The statements at the rate of a row that lead to the ends of its span."""
+        return body(closure(self.program.at("row"), self.program.ends or ()), self._places("row"))
 
     def sight(self) -> list[str]:
         """The statements that tell how surely a ray hits."""
@@ -73,19 +73,21 @@ class PrimaryBodies:
     def _carried(self, rate: Rate) -> Carried:
         steps = self.program.at(rate)
         faster = [step for r in _faster(rate) for step in self.program.at(r)]
-        used = {name for step in faster for name in step.uses()} | (set(self.program.outputs) - self.apart)
-        if rate == "row":
-            steps = closure(steps, used)
+        used = {name for step in faster for name in step.uses()} | set(self.program.outputs)
         fields = [(str(C_TYPES[step.format].name), step.name) for step in steps if step.name in used]
         fields += [("double", name) for name, of in self.inputs.items() if of == rate and name in used]
         if rate == "row" and any("y" in step.uses() for step in self.program.at("pixel")):
             fields.insert(0, ("double", "y"))
         shown = [(kind, name.removeprefix("scene_")) for kind, name in fields]
         places = self._places(rate)
+        ends = self.program.ends or ()
+        if rate == "row":
+            steps = closure([step for step in steps if step.name not in ends], used)
+            places |= dict.fromkeys(ends, "ends.")
         inits = tuple(
             f".{name.removeprefix('scene_')} = {places[name].replace('{}', name.removeprefix('scene_'))}"
             if name in self.inputs
-            else f".{name} = {name}"
+            else f".{name} = {places.get(name, '')}{name}"
             for _, name in fields
         )
         return Carried(tuple(declared(shown)), tuple(body(steps, places)), inits)

@@ -16,9 +16,11 @@ from symrender_cg.derive.margins import MOST_TURN, gate_part, with_margin
 from symrender_cg.derive.parts import Part, low
 from symrender_cg.emit.bodies import INDENT, body, closure, counts, operations
 from symrender_cg.emit.c99 import SUPPORT, Emitted, environment, printed_test, support_files
+from symrender_cg.emit.lobes import Lobes, lobes_of
 from symrender_cg.emit.parts import PrimaryBodies
 from symrender_cg.emit.scene_fields import Needs, field_lines, scene_fields
 from symrender_cg.lower.formats import WIDE
+from symrender_cg.lower.lower import FUNCTIONS
 from symrender_cg.lower.nodes import Call, walk
 from symrender_cg.lower.program import RATES, KernelProgram
 from symrender_cg.lower.variants import MOST_ROUNDOFFS, Variant
@@ -52,13 +54,11 @@ class Primary:
     sign_tests: tuple[dict[str, object], ...]
     distance: list[str]
     sight: list[str]
-    outline: list[str]
     stores: list[str]
     void_row: str
     void_distance: str
     void_sight: str
     void_surface: str
-    void_outline: str
 
 
 def scene_parts(need: Needs, *, marks: bool = False) -> dict[str, Part]:
@@ -123,14 +123,15 @@ def emit_scene(
     held = [f"{part.name}s" for part in primaries if part.bodies.has_sphere]
     held += ["row_first", "row_last"] if need.spheres else []
     held += ["lamps"] if need.lit else []
+    lobes = writer.lobes
+    squares = FUNCTIONS[variant.powers].get("whole") if lobes is not None and variant.passes.whole else None
+    held += ["half_exponents"] if squares else []
+    spared = marks and need.lit and not need.mirrors and not need.attenuation
+    held += ["spared"] if spared else []
     unit = f"h->{primaries[0].name}.plane_unit" if primaries else "1.0"
     contest = [
         *(["scene->partners_begin[k + 1] > scene->partners_begin[k]"] if need.intersections else []),
         *(["scene->crosses_plane[k]"] if need.crossing else []),
-    ]
-    spared = [
-        *(["!scene->at_eye[k]"] if need.at_eye else []),
-        *(["scene->partners_begin[k + 1] == scene->partners_begin[k]"] if need.intersections else []),
     ]
     contested = need.spheres and (need.intersections or need.crossing)
     context = {
@@ -161,8 +162,12 @@ def emit_scene(
         "spans": need.spans,
         "near": need.at_eye,
         "contested": contested,
+        "by_gaps": need.spans and not need.at_eye and not contested,
+        "owners": contested or need.at_eye or need.plane,
+        "lobes": lobes,
+        "squares": squares,
+        "spared": spared,
         "contest": " || ".join(contest),
-        "left_test": " && ".join(spared),
         "mirrored_spheres": need.mirrors,
         "primaries": primaries,
         "fields": lines,
@@ -244,7 +249,7 @@ def _point_arrays(need: Needs, stored: Sequence[str], real: str) -> list[str]:
 def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Primary:
     kind = program.name
     sources = [_source(name, of_sphere=kind != "plane") for name in stored]
-    bodies = PrimaryBodies(program, sources, parts.OUTLINE if kind == "span" else ())
+    bodies = PrimaryBodies(program, sources)
     given = [("ball", f"const {kind}_sphere *ball")] if bodies.has_sphere else []
     given.append(("f", f"const {kind}_frame *f"))
     names = [name for name, _ in given]
@@ -265,13 +270,11 @@ def _primary(program: KernelProgram, need: Needs, stored: Sequence[str]) -> Prim
         sign_tests=tests,
         distance=distance,
         sight=sight,
-        outline=bodies.outline(),
         stores=[_LOOP + line for line in stores],
         void_row=_void(bodies.row.lines, names),
         void_distance=_void(distance, ["r", *names]),
         void_sight=_void(sight, ["r", *names]),
         void_surface=_void([*bodies.surface, *stores], ["r", *names]),
-        void_outline=_void(bodies.outline(), names),
     )
 
 
@@ -308,7 +311,7 @@ def _includes(programs: Mapping[str, KernelProgram], need: Needs) -> list[str]:
         if isinstance(node, Call)
     }
     formats = {step.format for program in programs.values() for step in program.steps}
-    always = {"inline.h", "units.h"}
+    always = {"inline.h", "units.h", "block.h"}
     always |= {"span.h"} if need.spans else set()
     always |= {"double_double.h", "exact_sign.h"} if need.spheres else set()
     always |= {"double_double.h", "pair.h"} if "pair" in formats else set()
@@ -350,6 +353,7 @@ class _Loops:
         self.marks = marks
         self.parts = scene_parts(need, marks=marks)
         self.point = "p" if need.plane else "n"
+        self.lobes = self._lobes() if need.specular else None
 
     def context(self) -> dict[str, object]:
         """What the template places, by name."""
@@ -394,6 +398,10 @@ class _Loops:
                 found |= self._loop("landing", landing, (*second, *told))
                 found["landing_stores"] = self._stores(landing, ("mirror", "next"), ("n", normal), point="foot")
         return found
+
+    def _lobes(self) -> Lobes | None:
+        arrays = self.parts["glossy"].arrays
+        return lobes_of(self.programs["glossy"], ("cosine", "lobe"), dict.fromkeys(arrays, "p->{}[i]"), _LOOP)
 
     def _loop(
         self,

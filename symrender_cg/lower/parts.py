@@ -35,6 +35,8 @@ def lower_part(part: Part, chosen: Variant) -> KernelProgram:
     rates = tuple((name, cast(Rate, rate)) for name, rate in part.rates)
     inputs = tuple(name for name in part.inputs if name not in ("x", "y"))
     single = chosen.shading == "float32"
+    if part.name == "glossy":  # 0 or 1, and of each point: in its own format
+        chosen = replace(chosen, float64=chosen.float64 - {"zero_power"})
     program = KernelProgram(
         part.name,
         steps,
@@ -56,7 +58,7 @@ def lower_part(part: Part, chosen: Variant) -> KernelProgram:
         program = passes.scale_lengths(program, farthest=30 if single else 60)
     for step in (
         passes.regularise,
-        lambda p: passes.lower_powers(p, FUNCTIONS[chosen.powers]),
+        lambda p: passes.lower_powers(p, FUNCTIONS[chosen.powers], halves=chosen.passes.halves),
         passes.place,
         passes.hoist,
         passes.share,
