@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,7 @@ PAUSE = 0.01
 """Seconds between calls that come rarely."""
 
 BATCHED = ("two_spheres", "shadow", "hundred")
+GROUNDED = ("eye_plane", "mirrors")
 LOOPED = 20
 """Images of a loop over render_image that are measured."""
 
@@ -138,22 +140,29 @@ def _two_at_once(scene: Scene, side: int, images: Sequence[np.ndarray]) -> float
 
 
 def batches(rounds: int, seed: int) -> list[Row]:
-    """Microseconds an image of render_batch on one thread, of render_image in a loop, and their ratio."""
+    """Microseconds an image of render_batch on one thread, of render_image in a loop, and their ratio: Chapter 1's
+    sphere under a light that moves, and with highlights whose steep part `double` has the kernel of `stable` draw."""
     angles = np.linspace(0.0, 2.0 * math.pi, SETS, endpoint=False)
     places = np.stack([14.0 * np.sin(angles), np.full(SETS, 5.0), 14.0 + 2.0 * np.cos(angles)], axis=1)
+    moved: dict[str, dict[str, Floats]] = {
+        "lights": {"lights.0.position": places},
+        "exponents from 41 to 200": {"spheres.0.material.shininess": np.linspace(41.0, 200.0, SETS)},
+    }
     rows = []
-    for side in (16, 64, 256):
+    for (what, parameters), side in product(moved.items(), (16, 64, 256)):
         images = np.empty((SETS, side, side))
+        sets = parameter_sets(Scene.chapter1(), parameters)
+        scenes = [sets.scene(index) for index in range(SETS)]
 
-        def batch(side: int = side, images: np.ndarray = images) -> float:
+        def batch(side: int = side, images: Floats = images, parameters: dict[str, Floats] = parameters) -> float:
             start = time.perf_counter()
-            render_batch(None, {"lights.0.position": places}, side, side, out=images, threads=1)
+            render_batch(None, parameters, side, side, out=images, threads=1)
             return 1e6 * (time.perf_counter() - start) / SETS
 
-        def loop(side: int = side, images: np.ndarray = images) -> float:
+        def loop(side: int = side, images: Floats = images, scenes: Sequence[Scene] = scenes) -> float:
             start = time.perf_counter()
-            for image, place in zip(images, places.tolist(), strict=True):
-                render_image(Scene.chapter1(light=place), side, side, out=image, threads=1)
+            for image, scene in zip(images, scenes, strict=True):
+                render_image(scene, side, side, out=image, threads=1)
             return 1e6 * (time.perf_counter() - start) / SETS
 
         drawn: dict[str, Callable[[], float]] = {"batch": batch, "loop": loop}
@@ -161,61 +170,70 @@ def batches(rounds: int, seed: int) -> list[Row]:
             call()
         found = {key: np.array(values) for key, values in take_turns(drawn, rounds, seed, lambda _: None).items()}
         numbers = found["batch"], found["loop"], found["loop"] / found["batch"]
-        rows.append(Row(f"{SETS} lights, {side} x {side}", tuple(spread(v.tolist()) for v in numbers)))
+        rows.append(Row(f"{SETS} {what}, {side} x {side}", tuple(spread(v.tolist()) for v in numbers)))
     return rows
 
 
 def scene_batches(rounds: int, seed: int) -> list[Row]:
     """Microseconds an image of render_batch of scenes of many surfaces on one thread, of which to make its sets ready,
     of render_image in a loop, and their ratio; a light or a sphere moves, to places that were never planned before."""
-    draws = np.random.default_rng(seed)
-    rows = []
-    for name in BATCHED:
-        scene = Scene.builtin(name)
-        for what, far in (("lights.0.position", 0.25), ("spheres.0.center", 0.02)):
-            light = scene.lights[0]
-            assert isinstance(light, PointLight), "the lights of these scenes have a position"
-            place = np.array(light.position if what.startswith("lights") else scene.spheres[0].center)
-            for side, count in ((64, 200), (256, 40)):
-                images = np.empty((count, side, side))
+    return [
+        _moving(name, path, far, side, count, rounds, seed)
+        for name in BATCHED
+        for path, far in (("lights.0.position", 0.25), ("spheres.0.center", 0.02))
+        for side, count in ((64, 200), (256, 40))
+    ]
 
-                def sets(place: Floats = place, far: float = far, count: int = count) -> Floats:
-                    return place + draws.uniform(-far, far, (count, 3))
 
-                def batch(
-                    scene: Scene = scene, what: str = what, images: Floats = images, sets: Callable[[], Floats] = sets
-                ) -> float:
-                    places, start = sets(), time.perf_counter()
-                    render_batch(scene, {what: places}, *images.shape[1:], out=images, threads=1)
-                    return 1e6 * (time.perf_counter() - start) / len(images)
+def ground_batches(rounds: int, seed: int) -> list[Row]:
+    """The same of scenes with a plane, with mirrors, and of cameras that move."""
+    paths = (("lights.0.position", 0.25), ("spheres.0.center", 0.02), ("camera.eye", 0.1))
+    moves = [(name, *path) for name in GROUNDED for path in paths]
+    moves += [(name, "camera.eye", 0.1) for name in ("chapter1", "off_axis", *BATCHED)]
+    return [_moving(name, path, far, 64, SETS, rounds, seed) for name, path, far in moves]
 
-                def ready(
-                    scene: Scene = scene, what: str = what, images: Floats = images, sets: Callable[[], Floats] = sets
-                ) -> float:
-                    found = parameter_sets(scene, {what: sets()})
-                    asked = Asked(found, images.shape[2], images.shape[1], "double", None, True, 1, False, None)
-                    waiting, start = Waiting(deque(range(found.count))), time.perf_counter()
-                    while waiting.sets:
-                        make_chunk(asked, waiting, SECONDS_BETWEEN)
-                    return 1e6 * (time.perf_counter() - start) / found.count
 
-                def loop(
-                    scene: Scene = scene, what: str = what, images: Floats = images, sets: Callable[[], Floats] = sets
-                ) -> float:
-                    some = parameter_sets(scene, {what: sets()[:LOOPED]})
-                    start = time.perf_counter()
-                    for index in range(some.count):
-                        render_image(some.scene(index), *images.shape[1:], out=images[index], threads=1)
-                    return 1e6 * (time.perf_counter() - start) / some.count
+def _moving(name: str, path: str, far: float, side: int, count: int, rounds: int, seed: int) -> Row:
+    """The row of a scene in which a point moves by up to that far along each axis."""
+    draws, scene = np.random.default_rng(seed), Scene.builtin(name)
+    light = scene.lights[0]
+    assert isinstance(light, PointLight), "the first lights of these scenes have a position"
+    what, place = {
+        "lights.0.position": ("a light", light.position),
+        "spheres.0.center": ("a sphere", scene.spheres[0].center),
+        "camera.eye": ("the eye", scene.camera.eye),
+    }[path]
+    images = np.empty((count, side, side) if scene.channels == 1 else (count, side, side, 3))
 
-                drawn: dict[str, Callable[[], float]] = {"batch": batch, "ready": ready, "loop": loop}
-                for call in drawn.values():
-                    call()
-                found = {key: np.array(v) for key, v in take_turns(drawn, rounds, seed, lambda _: None).items()}
-                numbers = found["batch"], found["ready"], found["loop"], found["loop"] / found["batch"]
-                title = f"{name}, {'a light' if what.startswith('lights') else 'a sphere'} moves, {side} x {side}"
-                rows.append(Row(title, tuple(spread(v.tolist()) for v in numbers)))
-    return rows
+    def sets() -> Floats:
+        return np.array(place) + draws.uniform(-far, far, (count, 3))
+
+    def batch() -> float:
+        places, start = sets(), time.perf_counter()
+        render_batch(scene, {path: places}, side, side, out=images, threads=1)
+        return 1e6 * (time.perf_counter() - start) / count
+
+    def ready() -> float:
+        found = parameter_sets(scene, {path: sets()})
+        asked = Asked(found, side, side, "double", None, True, 1, False, None)
+        waiting, start = Waiting(deque(range(count))), time.perf_counter()
+        while waiting.sets:
+            make_chunk(asked, waiting, SECONDS_BETWEEN)
+        return 1e6 * (time.perf_counter() - start) / count
+
+    def loop() -> float:
+        some = parameter_sets(scene, {path: sets()[:LOOPED]})
+        start = time.perf_counter()
+        for index in range(some.count):
+            render_image(some.scene(index), side, side, out=images[index], threads=1)
+        return 1e6 * (time.perf_counter() - start) / some.count
+
+    drawn: dict[str, Callable[[], float]] = {"batch": batch, "ready": ready, "loop": loop}
+    for call in drawn.values():
+        call()
+    found = {key: np.array(v) for key, v in take_turns(drawn, rounds, seed, lambda _: None).items()}
+    numbers = found["batch"], found["ready"], found["loop"], found["loop"] / found["batch"]
+    return Row(f"{name}, {what} moves, {side} x {side}", tuple(spread(v.tolist()) for v in numbers))
 
 
 def proved_batches(rounds: int, seed: int) -> list[Row]:
@@ -278,6 +296,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             "a batch of scenes, us an image",
             ("render_batch", "of that to make ready", "render_image in a loop", "ratio"),
             scene_batches,
+        ),
+        (
+            "a batch of planes, mirrors and cameras, us an image",
+            ("render_batch", "of that to make ready", "render_image in a loop", "ratio"),
+            ground_batches,
         ),
         ("a batch proved, us an image", ("render_batch", "render_image in a loop", "ratio"), proved_batches),
     )

@@ -123,7 +123,7 @@ def test_sets_that_are_run_together_have_one_plan_one_level_and_the_numbers_of_t
     plan = planned(scene, aspect=1.0)
     order = tuple(numbers_of(plan.scene))
     handed = handed_over(scene, accuracy)
-    numbers, half_heights = alike.rows_alike(scene, plan, inputs, accuracy, order, handed=handed)
+    numbers, half_heights, _ = alike.rows_alike(scene, plan, inputs, accuracy, order, handed=handed)
     assert 1 <= len(numbers) == len(half_heights) <= sets.count
     for k, (row, half_height) in enumerate(zip(numbers.tolist(), half_heights.tolist(), strict=True)):
         each = sets.scene(k)
@@ -189,7 +189,7 @@ def test_a_run_ends_before_a_set_that_calls_for_another_kernel(case: str) -> Non
     scene = sets.scene(0)
     plan = planned(scene, aspect=1.0)
     order = tuple(numbers_of(plan.scene))
-    numbers, _ = alike.rows_alike(scene, plan, inputs, accuracy, order, handed=handed_over(scene, accuracy))
+    numbers, *_ = alike.rows_alike(scene, plan, inputs, accuracy, order, handed=handed_over(scene, accuracy))
     assert len(numbers) == (1 if "mirrored" in case else 2)
     found = render_batch(base, parameters, 9, 9, accuracy=accuracy)
     assert same_bits(found, one_by_one(base, parameters, 9, 9, accuracy=accuracy))

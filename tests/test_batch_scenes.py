@@ -27,7 +27,7 @@ from symrender_cg import (
 )
 from symrender_cg.errors import AccuracyError, OutsidePlanError, SceneError
 from symrender_cg.pipeline import statistics
-from symrender_cg.run import batch, chunks, lots, settling_many
+from symrender_cg.run import batch, chunks, settling_many, target
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.parameters import parameter_sets
 from symrender_cg.run.scene_kernel import SceneKernel
@@ -157,7 +157,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
         (SceneKernel, "onto_many"),
         (SettlingKernel, "settle_many"),
         (Kernel, "onto_many"),
-        (settling_many, "enclose_many"),
+        (settling_many, "settle_many"),
     ):
         count(holder, name)
     return found
@@ -199,7 +199,7 @@ def test_one_sphere_under_a_light_that_moves_is_settled_in_one_call(accuracy: st
     before = statistics.planned
     found = render_batch(None, places, 8, 8, accuracy=accuracy)
     assert counted["SettlingKernel.settle_many"] == 1
-    assert counted.get("settling_many.enclose_many", 0) <= 1
+    assert counted.get("settling_many.settle_many", 0) <= 1
     assert statistics.planned - before <= 4
     sets = parameter_sets(Scene.chapter1(), places)
     assert same_bits(found[7], render_image(sets.scene(7), 8, 8, accuracy=accuracy))
@@ -208,7 +208,7 @@ def test_one_sphere_under_a_light_that_moves_is_settled_in_one_call(accuracy: st
 def test_a_chunk_of_images_is_enclosed_in_one_call(counted: dict[str, int]) -> None:
     lights = {"lights.0.intensity": np.linspace(0.5, 1.0, 6)}
     render_batch(SHADED, lights, 8, 8, accuracy="stable")
-    assert counted == {"settling_many.enclose_many": 1}
+    assert counted == {"settling_many.settle_many": 1}
 
 
 # ---- bounded memory
@@ -230,7 +230,7 @@ def test_a_batch_ten_times_longer_holds_no_more_at_once(
 ) -> None:
     """With chunks of 16 images, or of one that is enclosed."""
     side = 16
-    for module in (chunks, lots):
+    for module in (chunks, target):
         monkeypatch.setattr(module, "MOST_PIXELS", 16 * side * side)
     held = {}
     for count in (32, 320) if accuracy == "double" else (8, 80):
@@ -311,8 +311,8 @@ def test_pixels_that_nothing_decides_are_named_with_their_set(monkeypatch: pytes
     def nothing(jobs: Any, places: Any, *_: Any) -> Any:
         return [(np.zeros((len(p), 1)), np.zeros(len(p), dtype=bool)) for p in places]
 
-    monkeypatch.setattr(lots, "enclosed_many", nothing)
-    monkeypatch.setattr(lots, "settle_by_oracle", open_ended)
+    monkeypatch.setattr(target, "enclosed_many", nothing)
+    monkeypatch.setattr(target, "settle_by_oracle", open_ended)
     with pytest.raises(AccuracyError, match=r"^parameters, set 0: stable: 1 of 64") as caught:
         render_batch(SHADED, {"lights.0.intensity": [1.0, 0.5]}, 8, 8, accuracy="stable")
     assert caught.value.points == (5,)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from symrender_cg.cli import explain_scene, explain_sphere
 from symrender_cg.cli.derivation import finding_data, print_findings
-from symrender_cg.cli.proof import print_proof
+from symrender_cg.cli.proof import print_proof, print_steep
 from symrender_cg.cli.requests import choice_data, show_choice
 from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import variant
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _ablate(scene, arguments)
     if arguments.findings:
         return _findings(scene, arguments)
-    from symrender_cg.explain import Explanation, explain, proof_of
+    from symrender_cg.explain import Explanation, explain, proof_of, steep_highlight_of
 
     width, height = arguments.size
     found = explain(
@@ -47,9 +47,11 @@ def run(arguments: argparse.Namespace) -> int:
         print(document(found), end="")
         return 0
     proof = proof_of(scene, arguments.accuracy, arguments.target, width=width, height=height)
+    steep = steep_highlight_of(scene, arguments.accuracy, width=width, height=height)
     if arguments.json:
         data = explain_sphere.as_data(found) if isinstance(found, Explanation) else explain_scene.as_data(found)
-        _out(data | {"proof": None if proof is None else asdict(proof)} | _choice_data(choice))
+        rest = {name: None if part is None else asdict(part) for name, part in (("proof", proof), ("steep", steep))}
+        _out(data | rest | _choice_data(choice))
         return 0
     if choice is not None:
         show_choice(choice)
@@ -57,6 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
     explain_sphere.show(found) if isinstance(found, Explanation) else explain_scene.show(found)
     if proof is not None:
         print_proof(proof)
+    if steep is not None:
+        print_steep(steep)
     return 0
 
 

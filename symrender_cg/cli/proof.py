@@ -1,4 +1,4 @@
-"""What `explain` prints of number formats and of how a level proves its values."""
+"""What `explain` prints of number formats, of how a level proves its values, and of boxes that another kernel draws."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from symrender_cg.cli.console import Column, Table
 from symrender_cg.cli.derivation import head
-from symrender_cg.explain import FORMATS, Proof
+from symrender_cg.explain import FORMATS, Proof, SteepHighlight
 
 
 def print_formats(formats: Iterable[tuple[str, tuple[str, ...]]]) -> None:
@@ -17,6 +17,14 @@ def print_formats(formats: Iterable[tuple[str, tuple[str, ...]]]) -> None:
         if form in found:
             table.add(words, str(len(found[form])), ", ".join(found[form]))
     table.show()
+
+
+def print_steep(found: SteepHighlight) -> None:
+    """The box of the image that another kernel draws, in a line."""
+    head("where the highlight is steep")
+    edges = f"{found.left:.4g} <= x <= {found.right:.4g}, {found.bottom:.4g} <= y <= {found.top:.4g}"
+    pixels = f"{found.columns} x {found.rows} of {found.width} x {found.height} pixels"
+    print(f"{edges} ({pixels}) is drawn by {found.kernel}: plain float64 may be off by more than 1e-15 there")
 
 
 def print_proof(proof: Proof) -> None:

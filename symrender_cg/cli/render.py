@@ -22,7 +22,8 @@ from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.output import SUFFIXES, ImageFormat, image_format, write_image
 from symrender_cg.pipeline import draw, enclosure_name, pixel_size, planned, statistics
-from symrender_cg.run.certify import Certified, Job, settle_image
+from symrender_cg.run.certificate import Certified, Job
+from symrender_cg.run.certify import settle_image
 from symrender_cg.run.levels import job_of
 from symrender_cg.run.ready import shape_of
 from symrender_cg.run.render import evaluate, render_layers

@@ -18,7 +18,14 @@ from symrender_cg.explain.operations import part_operations, swollen_operations
 from symrender_cg.explain.quantities import Quantity
 from symrender_cg.explain.scene import PartExplanation, SceneExplanation, explain_scene
 from symrender_cg.explain.sphere import CENTRED, Explanation, Step, explain_sphere
-from symrender_cg.explain.stages import FORMATS, Proof, ProofStage, proof_of
+from symrender_cg.explain.stages import (
+    FORMATS,
+    Proof,
+    ProofStage,
+    SteepHighlight,
+    proof_of,
+    steep_highlight_of,
+)
 from symrender_cg.lower.variants import variant
 from symrender_cg.pipeline import SphereTranslation, translate
 from symrender_cg.scene import Scene
@@ -32,10 +39,12 @@ __all__ = [
     "ProofStage",
     "Quantity",
     "SceneExplanation",
+    "SteepHighlight",
     "Step",
     "explain",
     "part_operations",
     "proof_of",
+    "steep_highlight_of",
     "swollen_operations",
 ]
 

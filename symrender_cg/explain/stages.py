@@ -1,4 +1,5 @@
-"""How a level proves its values: what is claimed, the chain of stages, and the bound of its first kernel for one image.
+"""How a level proves its values: what is claimed, the chain of stages, and the bound of its first kernel for one image;
+and where `double` has another kernel draw a part of the image.
 
 Comes in: a scene, a level, a size. Goes out: Proof, frozen, or None for a level that one kernel draws alone. The bound
 is computed by the kernel itself, so that it is compiled here if it has not been; without a compiler it is None.
@@ -10,11 +11,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from symrender_cg.errors import ToolchainError
 from symrender_cg.lower.variants import variant
 from symrender_cg.pipeline import enclosure_name, pixel_size, planned, settling_kernel
-from symrender_cg.run.certify import Job
-from symrender_cg.run.levels import job_of
+from symrender_cg.run.box_pixels import box_pixels
+from symrender_cg.run.certificate import Job
+from symrender_cg.run.kernel import GRID
+from symrender_cg.run.levels import job_of, steep_part
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.scene import Scene
 
@@ -62,6 +67,39 @@ class Proof:
     width: int
     height: int
     stages: tuple[ProofStage, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SteepHighlight:
+    """Where a highlight is too steep for plain float64, and which kernel draws there in place of that of `double`.
+
+    left, right, bottom, top   of a box of the image plane, scene units
+    columns, rows              how many of an image of width x height pixels it holds
+    kernel                     C name
+    """
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+    columns: int
+    rows: int
+    width: int
+    height: int
+    kernel: str
+
+
+def steep_highlight_of(scene: Scene, accuracy: str, *, width: int, height: int) -> SteepHighlight | None:
+    """The box of an image at `double` that the kernel of `stable` draws; None where there is none."""
+    box = steep_part(scene, width / height) if accuracy == "double" else None
+    if box is None:
+        return None
+    found = planned(scene, aspect=width / height)
+    grid = np.array([(width, height, pixel_size(found.scene, height), 1.0)], dtype=GRID)
+    pixels = box_pixels(box.edges, grid)[0]
+    columns, rows = (int(pixels[f"{side}_end"] - pixels[f"{side}_begin"]) for side in ("column", "row"))
+    edges = (box.left, box.right, box.bottom, box.top)
+    return SteepHighlight(*edges, columns, rows, width, height, f"{found.name}_{variant('stable').name}")
 
 
 def proof_of(scene: Scene, accuracy: str, target: str | None, *, width: int, height: int) -> Proof | None:

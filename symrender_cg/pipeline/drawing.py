@@ -19,7 +19,11 @@ from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.pipeline.kernels import kernel_of
 from symrender_cg.pipeline.plans import pixel_size, planned
-from symrender_cg.run.drawing import Drawing, Steep, bind
+from symrender_cg.pipeline.proving import settling_kernel
+from symrender_cg.run.drawing import Drawing, bind
+from symrender_cg.run.numbers import numbers_of
+from symrender_cg.run.settling_kernel import SettlingKernel
+from symrender_cg.run.steep_rows import Steep
 from symrender_cg.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -66,20 +70,52 @@ def _steep(
 
     if accuracy != "double" or (box := steep_part(scene, aspect)) is None:
         return None
-    return Steep(box, partial(_stable_values, scene, portable, cache))
+    return Steep(
+        box,
+        partial(_stable_kernel, scene, aspect, portable, cache),
+        partial(_stable_values, scene, portable, cache),
+        partial(_stable_pixels, scene, portable, cache),
+    )
+
+
+def _stable_kernel(
+    scene: Scene, aspect: float | None, portable: bool, cache: str | Path | None
+) -> tuple[SettlingKernel, Any]:
+    """The kernel of `stable` and the scene's numbers."""
+    found = settling_kernel(scene, variant("stable"), aspect=aspect, portable=portable, cache=cache)
+    assert found is not None, "it is one sphere under one light"
+    kernel, frame = found
+    return kernel, kernel.numbers(numbers_of(frame))
 
 
 def _stable_values(scene: Scene, portable: bool, cache: str | Path | None, x: Floats, y: Floats) -> Any:
     """Values within 4 ulp at points."""
-    from symrender_cg.run.certify import Job, settle_points
+    from symrender_cg.run.certificate import Job
+    from symrender_cg.run.certify import settle_points
 
     return settle_points(Job(scene, variant("stable"), False, portable, cache, 1), x, y).values
+
+
+def _stable_pixels(
+    scene: Scene, portable: bool, cache: str | Path | None, places: NDArray[np.intp], width: int, height: int
+) -> Any:
+    """Values within 4 ulp of pixels that the kernel of `stable` leaves open."""
+    from symrender_cg.run.certificate import Job
+    from symrender_cg.run.certify import settle_by_oracle
+    from symrender_cg.run.settling_many import enclosed_many
+
+    job = Job(scene, variant("stable"), False, portable, cache, 1)
+    values, known = enclosed_many([job], [places], width, height, 1)[0]
+    if not known.all():
+        values[~known, 0] = settle_by_oracle(job, width, height, places[~known])
+    return values[:, 0]
 
 
 def _decided(
     scene: Scene, aspect: float | None, portable: bool, cache: str | Path | None, x: Floats, y: Floats
 ) -> tuple[Any, Any]:
     """Values within 4 ulp at points where rounding decided a kernel of a scene, and which of them are known."""
-    from symrender_cg.run.certify import Job, settle_if_known
+    from symrender_cg.run.certificate import Job
+    from symrender_cg.run.certify import settle_if_known
 
     return settle_if_known(Job(scene, variant("stable"), False, portable, cache, 1), x, y, aspect)

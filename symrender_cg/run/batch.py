@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.lower.variants import variant
-from symrender_cg.run.certify import Job
+from symrender_cg.run.certificate import Job
 from symrender_cg.run.chunks import Asked, Waiting, make_chunk
-from symrender_cg.run.lots import Rows, Target
 from symrender_cg.run.parameters import Parameters, parameter_sets
 from symrender_cg.run.ready import checked_out, shape_of, side
+from symrender_cg.run.target import Rows, Target
 from symrender_cg.run.threads import thread_count
 from symrender_cg.scene import Scene, load_scene
 

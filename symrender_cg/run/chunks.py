@@ -23,20 +23,25 @@ from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.pipeline import pixel_size, planned
 from symrender_cg.pipeline.kernels import kernel_of
 from symrender_cg.plan.plan import Plan
-from symrender_cg.plan.stack import EFFECTS, Stack, Weighed, effects_of, is_stackable, weigh
+from symrender_cg.plan.stack import EFFECTS, Weighed, effects_of, is_stackable, weigh
 from symrender_cg.plan.stack_lists import decide
-from symrender_cg.run.alike import inputs_of, inputs_of_scenes, rows_alike
-from symrender_cg.run.certify import Job
+from symrender_cg.plan.stack_numbers import Stack
+from symrender_cg.run.alike import inputs_for, rows_alike
+from symrender_cg.run.certificate import Job
 from symrender_cg.run.kernel import Kernel
-from symrender_cg.run.levels import MOST_SHININESS, drawn_as, job_of, steep_part
-from symrender_cg.run.lots import Lot, OwnLot, PlainLot, ProvedLot, SceneLot, SettlingLot, named
+from symrender_cg.run.levels import MOST_SHININESS, drawn_as, job_of
+from symrender_cg.run.lots import Lot, OwnLot, ProvedLot, SceneLot
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.run.parameters import Sets
 from symrender_cg.run.ready import make_ready
 from symrender_cg.run.scene_kernel import SceneKernel
 from symrender_cg.run.scene_numbers import scene_numbers
 from symrender_cg.run.settling_kernel import SettlingKernel
-from symrender_cg.run.stacking import stack_of, structures_of
+from symrender_cg.run.sphere_lots import PlainLot, SettlingLot
+from symrender_cg.run.stack_structures import structures_of
+from symrender_cg.run.stacking import stack_of
+from symrender_cg.run.steep import boxes_drawn
+from symrender_cg.run.target import named
 from symrender_cg.run.threads import MOST_PIXELS
 from symrender_cg.scene import Scene
 
@@ -51,6 +56,8 @@ MOST_PAIRS = 1 << 19
 
 _AS_PIXELS = 16
 """A pixel that is enclosed takes the memory of so many that are not."""
+
+_NO_BOX = np.full((1, 4), np.nan)
 
 L = TypeVar("L")
 
@@ -177,7 +184,7 @@ def _add(chunk: Chunk, asked: Asked, waiting: Waiting) -> None:
         return
     index = waiting.sets[0]
     scene = chunk.scene(asked.sets, index)
-    if asked.pixels > MOST_PIXELS or (asked.accuracy == "double" and steep_part(scene, asked.aspect) is not None):
+    if asked.pixels > MOST_PIXELS:
         waiting.sets.popleft()
         chunk.lots[index] = _own(asked, index, scene)
         chunk.pixels += asked.pixels
@@ -224,14 +231,14 @@ def _own(asked: Asked, index: int, scene: Scene) -> OwnLot:
 def _add_stack(chunk: Chunk, asked: Asked, waiting: Waiting) -> bool:
     """Adds the next sets that are seen to have the plan that sets are compared with, or one that differs in what lights
     and shadows add alone; False where the next one is not."""
-    if waiting.base is None:
+    if waiting.base is None or len(waiting.sets) < 2:  # a plan is as soon made as the arrays of one set
         return False
     scene, found = waiting.base
     pairs = len(scene.spheres) ** 2 + 1
     pixels = asked.pixels * (_AS_PIXELS if asked.settles else 1)
     room = (MOST_PIXELS - chunk.pixels) // pixels, MOST_PAIRS // pairs
     looked_at = waiting.some(min(room))
-    read = stack_of(scene, found, asked.sets, looked_at)
+    read = stack_of(scene, asked.sets, looked_at)
     if read is None or read[1][0] != looked_at[0]:
         return False
     stack, members = read
@@ -267,10 +274,11 @@ def _add_weighed(
         assert isinstance(kernel, SceneKernel), "it has the spheres of a scene"
         decided = decide(weighed, chosen)
         same = scene_numbers(found.scene, arrangement, kernel.channels)
-        made, keeps = structures_of(kernel, same, weighed.stack, decided)
+        made, keeps = structures_of(kernel, found.scene, same, weighed.stack, decided)
         sides = 2.0 * weighed.stack.half_height[chosen] / asked.height
         _add_scenes(chunk, asked, kernel, members, made, keeps, sides.tolist())
-        chunk.entries += decided.spheres.size + len(decided.lamp_light) + len(decided.blockers)
+        chunk.entries += len(decided.spheres) + len(decided.lamp_light) + len(decided.blockers.members)
+        chunk.entries += len(decided.mirrors.members) + len(decided.partners.members)
         taken += members
     return taken
 
@@ -300,29 +308,36 @@ def _add_scenes(
 def _of_one_level(asked: Asked, scene: Scene, stack: Stack) -> NDArray[np.bool_]:
     """(T,): the level's kernel is that of the scene, see symrender_cg.run.levels.drawn_as."""
     steep = np.asarray((stack.shininess > MOST_SHININESS).any(axis=1))
-    is_steep = any(sphere.material.shininess > MOST_SHININESS for sphere in scene.spheres)
+    is_steep = drawn_as(scene, "fast") != "fast"
     return np.asarray((steep == is_steep) | (asked.accuracy != "fast"), dtype=np.bool_)
 
 
 def _add_spheres(chunk: Chunk, asked: Asked, waiting: Waiting, kernel: Kernel, found: Plan) -> None:
     sets, settles = asked.sets, isinstance(kernel, SettlingKernel)
     looked_at = waiting.some((MOST_PIXELS - chunk.pixels) // asked.pixels if settles else MOST_SETS)
-    if sets.scenes:
-        inputs = inputs_of_scenes([sets.scenes[index] for index in looked_at])
-    else:
-        inputs = inputs_of({path: column[looked_at] for path, column in sets.columns.items()})
+    scene = chunk.scene(sets, looked_at[0])
+    inputs = inputs_for(scene, sets, looked_at)
+    first = numbers_of(found.scene)
+    names, boxed = tuple(first), asked.accuracy == "double" and not settles
     if inputs:
-        scene = chunk.scene(sets, looked_at[0])
-        numbers, half_heights = rows_alike(scene, found, inputs, asked.accuracy, kernel.inputs, handed=settles)
-        pixels = 2.0 * half_heights / asked.height
+        alike = rows_alike(scene, found, inputs, asked.accuracy, names, handed=settles, boxed=boxed)
+        numbers, pixels, edges = alike.numbers, 2.0 * alike.half_heights / asked.height, alike.edges
     else:
-        values = numbers_of(found.scene)
-        numbers = np.array([[values[name] for name in kernel.inputs]])
-        pixels = np.array([pixel_size(found.scene, asked.height)])
+        numbers, pixels = np.array([[*first.values()]]), np.array([pixel_size(found.scene, asked.height)])
+        edges = boxes_drawn({name: np.array([value]) for name, value in first.items()}) if boxed else _NO_BOX
     taken = looked_at[: len(numbers)]
-    lot = chunk.lot(kernel, SettlingLot, kernel) if settles else chunk.lot(kernel, PlainLot, kernel)
-    lot.sets += taken
-    lot.numbers.append(numbers)
-    lot.pixels.append(pixels)
-    chunk.pixels += len(taken) * asked.pixels if settles else 0
+    lot = chunk.lot(kernel, SettlingLot if settles else PlainLot, kernel, names)
+    lot.add(taken, numbers, pixels)
+    open_images = len(taken)
+    if isinstance(lot, PlainLot):
+        open_images = int(np.count_nonzero(~np.isnan(edges[:, 0])))
+        lot.edges.append(edges)
+        lot.stable = lot.stable or (_stable(asked, found) if open_images else None)
+    chunk.pixels += open_images * asked.pixels
     waiting.take(looked_at, taken)
+
+
+def _stable(asked: Asked, found: Plan) -> SettlingKernel:
+    kernel = asked.kernel(found, variant("stable"))
+    assert isinstance(kernel, SettlingKernel), "it bounds its own error"
+    return kernel

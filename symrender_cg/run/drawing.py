@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrender_cg.plan.plan import Plan
-from symrender_cg.run.grid import pixel_centres
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.run.pool import SCENE_PIXELS, Pool, Shared
 from symrender_cg.run.scene_kernel import Prepared, SceneKernel
 from symrender_cg.run.scene_numbers import scene_numbers
-from symrender_cg.run.steep import Box
+from symrender_cg.run.steep_rows import BoundBox, Steep, SteepRows, bound_box
 from symrender_cg.run.threads import over_rows
 
 
@@ -36,7 +35,7 @@ class Drawing:
     decide     (x, y) -> values at points where rounding may have decided, and which of them are known; None: the kernel
                of the level decides nothing by rounding, or promises nothing of it
     width      of the image in pixels, and its height; 1 and 1 for points
-    steep      what draws a box of the image in place of the kernel of one sphere, see steep.py
+    steep      what draws a box of the image in place of the kernel of one sphere, see steep_rows.py
     """
 
     plan: Plan
@@ -54,6 +53,13 @@ class Drawing:
         """The pixels as the kernel of one sphere takes them."""
         assert isinstance(self.kernel, Kernel), "a scene's tables hold its grid"
         return self.kernel.grid(self.width, self.height, self.pixel, self.white)
+
+    @cached_property
+    def box(self) -> BoundBox | None:
+        """The pixels that `steep` draws; None where there are none."""
+        if self.steep is None:
+            return None
+        return bound_box(self.steep, self.width, self.height, self.pixel, self.white)
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -73,7 +79,7 @@ class Drawing:
         """What writes rows [begin, end) of the image into an array with contiguous rows, whose row 0 is row `first`."""
         if isinstance(self.kernel, Kernel):
             rows = self.kernel.onto(image, self.numbers, self.grid, first=first)
-            return rows if self.steep is None else SteepRows(self, image, first, rows)
+            return rows if self.box is None else SteepRows(rows, self.box, image, first)
         return SceneRows(self, image, first)
 
     def rows(
@@ -120,20 +126,6 @@ class Drawing:
                 found = self.steep.values(x.reshape(-1)[inside], y.reshape(-1)[inside])
                 values.reshape(-1)[inside] = np.minimum(found, self.white)
 
-    def draw_steep(self, image: NDArray[Any], begin: int, end: int, first: int) -> None:
-        """Writes what rows [begin, end) have of the box where the highlight is steep."""
-        assert self.steep is not None, "there is one"
-        box = self.steep.box
-        x, _ = pixel_centres(self.width, 1, self.pixel)
-        y = ((0.5 * self.height - 0.5) - np.arange(begin, end)) * np.float64(self.pixel)
-        columns, rows = (np.flatnonzero(inside) for inside in (box.across(x), box.down(y)))
-        if columns.size and rows.size:
-            across, down = slice(columns[0], columns[-1] + 1), slice(rows[0], rows[-1] + 1)
-            at_x, at_y = np.broadcast_arrays(x[across], y[down, np.newaxis])
-            values = self.steep.values(at_x.reshape(-1), at_y.reshape(-1)).reshape(at_x.shape)
-            at = begin - first
-            image[at + down.start : at + down.stop, across] = np.minimum(values, self.white)
-
     def _narrowed(self, values: NDArray[Any]) -> NDArray[Any]:
         """Settled values as the kernel would have written them: in its channels, white at most."""
         cut: NDArray[Any] = np.minimum(values, self.white)
@@ -164,43 +156,8 @@ class SceneRows(Shared):
             over_rows(lambda k, last: drawing.settle(image, doubtful[k:last], first), doubtful.size, threads)
 
 
-class SteepRows(Shared):
-    """Rows of one sphere's image, and after them what they have of the box where the highlight is steep."""
-
-    __slots__ = ("drawing", "first", "image", "library", "rows")
-    rows: Callable[[int, int], None]
-
-    def __init__(self, drawing: Drawing, image: NDArray[Any], first: int, rows: Callable[[int, int], None]) -> None:
-        self.drawing, self.image, self.first, self.rows = drawing, image, first, rows
-        self.library = drawing.kernel.library
-
-    @property
-    def least_pixels(self) -> int:  # type: ignore[override]
-        """That of the kernel's rows."""
-        assert isinstance(self.rows, Shared), "a kernel's rows are"
-        return self.rows.least_pixels
-
-    def __call__(self, begin: int, end: int, /) -> None:
-        self.rows(begin, end)
-        self.drawing.draw_steep(self.image, begin, end, self.first)
-
-    def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
-        """Draws rows [begin, end) on so many threads, at least so many rows at a time."""
-        assert isinstance(self.rows, Shared), "a kernel's rows are"
-        self.rows.share(pool, begin, end, least, threads)
-        self.drawing.draw_steep(self.image, begin, end, self.first)
-
-
 LEAST_SHARED = 256
 """So many points in doubt are some milliseconds of work: enough to wake threads of Python for."""
-
-
-@dataclass(frozen=True, slots=True)
-class Steep:
-    """A box of the image plane, and what gives values at points in it, unclipped."""
-
-    box: Box
-    values: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[Any]]
 
 
 Decide = Callable[[NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[Any], NDArray[np.bool_]]]

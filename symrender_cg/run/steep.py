@@ -1,7 +1,9 @@
 """How far double's kernel of one sphere may be off, and the box of the image plane where its highlight is too steep.
 
-Comes in: the numbers of a scene, as kernels take them. Goes out: bounds in roundoffs, 2^-53, of max(1, value), and a
-`Box`: outside it the kernel keeps 1e-15, inside it another one draws. Never done here: a kernel, or an image.
+Comes in: the numbers of a scene, as kernels take them, or of many scenes as arrays. Goes out: bounds in roundoffs,
+2^-53, of max(1, value), and boxes: outside its box the kernel keeps 1e-15, inside it another one draws. A scene's box
+has the same bits alone and among others: every operation on arrays is one that rounds correctly.
+Never done here: a kernel, or an image.
 
 An error of the mirrored ray's angle changes r.v^n by n sin(angle) r.v^(n - 1) times as much: by nothing in the middle
 of the highlight, by sqrt(n / e) at 1 / sqrt(n) radians from it, and by nothing far from it.
@@ -10,7 +12,7 @@ of the highlight, by sqrt(n / e) at 1 / sqrt(n) radians from it, and by nothing 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -26,6 +28,11 @@ LEAST_SHININESS = 8.0
 
 MOST_ANGLE = 0.6
 """A box for more of the highlight than this, in radians of r.v, would be a large part of the image."""
+
+MOST_OF_PICTURE = 0.75
+"""The largest part of the sphere's picture that a box may have. The kernel of `double` takes 0.2 to 0.5 of the time
+that `stable` takes for a pixel: beyond this part the latter draws everything about as soon as the two together. It is a
+matter of the scene alone, so that images of any size, points and sets of a batch agree."""
 
 LEAST_FACING = 0.3
 """Cosine of the angle at which a mirrored ray meets the sphere: flatter ones draw a highlight out to the silhouette."""
@@ -48,15 +55,13 @@ class Box:
 
     def holds(self, x: Floats, y: Floats) -> NDArray[np.bool_]:
         """Which points lie in it."""
-        return self.across(x) & self.down(y)
+        across, down = (x >= self.left) & (x <= self.right), (y >= self.bottom) & (y <= self.top)
+        return np.asarray(across & down, dtype=np.bool_)
 
-    def across(self, x: Floats) -> NDArray[np.bool_]:
-        """Which columns cross it."""
-        return np.asarray((x >= self.left) & (x <= self.right), dtype=np.bool_)
-
-    def down(self, y: Floats) -> NDArray[np.bool_]:
-        """Which rows do."""
-        return np.asarray((y >= self.bottom) & (y <= self.top), dtype=np.bool_)
+    @property
+    def edges(self) -> Floats:
+        """(1, 4): left, right, bottom, top."""
+        return np.array([[self.left, self.right, self.bottom, self.top]])
 
 
 class _Terms(NamedTuple):
@@ -129,81 +134,137 @@ def _tangent(cosine: Any, distance: Any) -> Any:
     return np.where(ahead > 0.0, np.minimum(np.sqrt(0.5 - 0.5 * cosine) / ahead, 1.0), 1.0)
 
 
-def steep_share(numbers: Mapping[str, float]) -> float:
+def steep_share(numbers: Mapping[str, Any]) -> Any:
     """The part of the highlight's greatest steepness, sqrt(n / e), that leaves errors at MOST_ROUNDOFFS; at most 1, and
-    0 where it is not the highlight alone that is in the way."""
-    terms, intensity = _terms(numbers), numbers["light_intensity"]
-    if not terms.known or intensity <= 0.0:
-        return 0.0
-    left = ((MOST_ROUNDOFFS - 1.0) / intensity) ** 2 - float(terms.diffuse) ** 2
-    if left <= 0.0 or terms.steep <= 0.0:
-        return 0.0
-    return min(1.0, max(0.0, (math.sqrt(left) - float(terms.flat)) / float(terms.steep)))
+    0 where it is not the highlight alone that is in the way. By a scene's numbers, or by those of many as arrays."""
+    terms, intensity = _terms(numbers), np.asarray(numbers["light_intensity"])
+    with np.errstate(all="ignore"):
+        whole = (MOST_ROUNDOFFS - 1.0) / intensity
+        left = whole * whole - terms.diffuse * terms.diffuse
+        share = np.clip((np.sqrt(left) - terms.flat) / terms.steep, 0.0, 1.0)
+    return np.where(terms.known & (intensity > 0.0) & (left > 0.0) & (terms.steep > 0.0), share, 0.0)
 
 
 def steep_box(numbers: Mapping[str, float]) -> Box | None:
     """The box outside which errors of the kernel of `double` are at most MOST_ROUNDOFFS; None where there is no small
-    one.
+    one."""
+    edges = steep_boxes({name: np.array([value]) for name, value in numbers.items()})[0]
+    return None if np.isnan(edges[0]) else Box(*edges.tolist())
+
+
+def boxes_drawn(numbers: Mapping[str, Floats]) -> Floats:
+    """(scenes, 4): the boxes that another kernel draws at `double`, as `steep_boxes` has them; NaN where there is none,
+    or none is needed."""
+    edges = np.full((len(numbers["radius"]), 4), np.nan)
+    with np.errstate(all="ignore"):  # numbers may be those of no scene
+        beyond = np.flatnonzero(~(roundoffs(numbers) <= MOST_ROUNDOFFS))
+        if beyond.size:
+            edges[beyond] = steep_boxes({name: column[beyond] for name, column in numbers.items()})
+    return edges
+
+
+def steep_boxes(numbers: Mapping[str, Floats]) -> Floats:
+    """(scenes, 4): left, right, bottom and top of the box of each scene, by columns of numbers; NaN where there is no
+    small one.
 
     t exp(-t^2 / 2) is at most a part q of its largest value from t = 1 + sqrt(2 log(1 / q)) on, and t = sqrt(n) angle.
     """
     share, n = steep_share(numbers), numbers["shininess"]
-    if share <= 0.0 or n < LEAST_SHININESS:
-        return None
-    angle = (1.0 + math.sqrt(-2.0 * math.log(share))) / math.sqrt(n - 1.0)
-    return None if angle > MOST_ANGLE else _box_around(numbers, angle)
+    edges = np.full((len(n), 4), np.nan)
+    boxed = np.flatnonzero((share > 0.0) & (n >= LEAST_SHININESS))
+    logarithm = _each(math.log, share[boxed])
+    angle = (1.0 + np.sqrt(-2.0 * logarithm)) / np.sqrt(n[boxed] - 1.0)
+    boxed, angle = boxed[angle <= MOST_ANGLE], angle[angle <= MOST_ANGLE]
+    if boxed.size:
+        edges[boxed] = _boxes_around({name: column[boxed] for name, column in numbers.items()}, angle)
+    return edges
 
 
-def _box_around(numbers: Mapping[str, float], angle: float) -> Box | None:
-    """A box that holds all points of the sphere whose mirrored ray passes the light by at most that angle.
+def _boxes_around(numbers: Mapping[str, Floats], angle: Floats) -> Floats:
+    """(scenes, 4): boxes that hold all points of a sphere whose mirrored ray passes the light by at most that angle;
+    NaN where there is none.
 
     With the normal turned by b, in any direction, the ray mirrored there is 2 cos(a) sin(b) away from the one that
     meets a far light, on the unit sphere, or farther, a being the angle of incidence; a light or an eye that is near
     turns away, too. The cap of the sphere within b of the highlight's middle lies in a cylinder of radius sin(b)
     between two planes, and its picture in the hull of that of a prism around it.
     """
-    radius = numbers["radius"]
-    center = np.array([numbers[f"center_{axis}"] for axis in "xyz"])
-    to_light = np.array([numbers[f"light_{axis}"] for axis in "xyz"]) - center
-    to_light /= max(radius, float(np.abs(to_light).max()) / FARTHEST)
-    eye = np.array([0.0, 0.0, numbers["eye"]])
-    to_eye = (eye - center) / radius
-    middle = _middle_of_highlight(to_light, to_eye)
-    if middle is None:
-        return None
-    facing = float(middle @ _unit(to_eye - middle))
-    sine = ROOM * math.sin(0.5 * angle) / facing if facing >= LEAST_FACING else 1.0
-    if sine > MOST_ANGLE:
-        return None
-    first = _unit(np.cross(middle, np.eye(3)[int(np.argmin(np.abs(middle)))]))
-    second = np.cross(middle, first)
-    turns = np.arange(CORNERS) * (2.0 * math.pi / CORNERS)
-    ring = np.outer(np.cos(turns), first) + np.outer(np.sin(turns), second)
-    ring *= sine / math.cos(math.pi / CORNERS)
-    corners = center + radius * np.concatenate(
-        [ring + height * middle for height in (math.sqrt(1.0 - sine * sine), 1.0)]
-    )
-    depth = eye[2] - corners[:, 2]
-    if depth.min() <= 1e-3 * radius:
-        return None
-    x, y = corners[:, 0] * eye[2] / depth, corners[:, 1] * eye[2] / depth
-    return Box(float(x.min()), float(x.max()), float(y.min()), float(y.max()))
+    radius, eye = numbers["radius"], numbers["eye"]
+    center, to_light = (np.stack([numbers[f"{what}_{axis}"] for axis in "xyz"]) for what in ("center", "light"))
+    to_light = to_light - center
+    to_eye = np.stack([-center[0], -center[1], eye - center[2]]) / radius
+    with np.errstate(all="ignore"):
+        middle = _middles_of_highlights(to_light / np.maximum(radius, np.abs(to_light).max(axis=0) / FARTHEST), to_eye)
+        facing = _dot(middle, _unit(to_eye - middle))
+        sine = np.where(facing >= LEAST_FACING, ROOM * _each(math.sin, 0.5 * angle) / facing, np.inf)
+        first = _unit(_cross(middle, np.eye(3)[:, np.argmin(np.abs(middle), axis=0)]))
+        second = _cross(middle, first)
+        ring = np.multiply.outer(_COSINES, first) + np.multiply.outer(_SINES, second)
+        ring *= sine / math.cos(math.pi / CORNERS)
+        prism = np.concatenate([ring + height * middle for height in (np.sqrt(1.0 - sine * sine), np.ones_like(sine))])
+        x, y, z = (center + radius * prism).transpose(1, 0, 2)
+        depth = eye - z
+        x, y = x * eye / depth, y * eye / depth
+        edges = left, right, bottom, top = x.min(axis=0), x.max(axis=0), y.min(axis=0), y.max(axis=0)
+        small = (right - left) * (top - bottom) <= MOST_OF_PICTURE * _picture(to_eye, eye)
+    known = (sine <= MOST_ANGLE) & (depth.min(axis=0) > 1e-3 * radius) & small
+    return np.where(known[:, np.newaxis], np.stack(edges, axis=1), np.nan)
 
 
-def _middle_of_highlight(to_light: Floats, to_eye: Floats) -> Floats | None:
-    """The normal where the light's ray is mirrored to the eye; both are ways from the centre, in radii. None where it
-    is not found."""
-    if to_light @ to_light <= 1.0 or to_eye @ to_eye <= 1.0:
-        return None
-    middle = _unit(_unit(to_light) + _unit(to_eye))
-    for _ in range(100):
-        half = _unit(_unit(to_light - middle) + _unit(to_eye - middle))
-        if float(np.abs(half - middle).max()) < 1e-9:
-            return half
-        middle = _unit(middle + 0.6 * (half - middle))
-    return None
+def _picture(to_eye: Floats, eye: Floats) -> Floats:
+    """The area of the ellipse that a sphere is seen as, pi e^2 sqrt(d^2 - 1) / (z^2 - 1)^(3/2); inf for a sphere that
+    reaches the plane of the eye. d is the distance of the eye from the centre in radii, z that along the axis."""
+    beyond = np.maximum(to_eye[2] * to_eye[2] - 1.0, 0.0)
+    area: Floats = math.pi * eye * eye * np.sqrt(_dot(to_eye, to_eye) - 1.0) / (beyond * np.sqrt(beyond))
+    return area
+
+
+def _middles_of_highlights(to_light: Floats, to_eye: Floats) -> Floats:
+    """(3, scenes): the normals where a light's ray is mirrored to the eye; both are ways from the centre, in radii. NaN
+    where none is found.
+
+    The normal is turned to the one half way between the ways to light and eye, which turns that back by about half of
+    1 / length of each way: so it is turned by as much less.
+    """
+    found = np.full_like(to_light, np.nan)
+    left = np.flatnonzero((_dot(to_light, to_light) > 1.0) & (_dot(to_eye, to_eye) > 1.0))
+    ends = np.stack([to_light, to_eye], axis=1)[..., left]
+    middle = _unit(_unit(ends).sum(axis=1))
+    for _ in range(100 if left.size else 0):
+        ways = ends - middle[:, np.newaxis]
+        inverse = 1.0 / np.sqrt(_dot(ways, ways))
+        half = _unit((inverse * ways).sum(axis=1))
+        turn = half - middle
+        near = np.abs(turn).max(axis=0) < 1e-9
+        middle = _unit(middle + turn / (1.0 + 0.5 * inverse.sum(axis=0)))
+        if near.any():
+            found[:, left[near]] = half[:, near]
+            left, ends, middle = left[~near], ends[..., ~near], middle[:, ~near]
+            if not left.size:
+                break
+    return found
+
+
+_COSINES, _SINES = (
+    np.array([turn(k * (2.0 * math.pi / CORNERS)) for k in range(CORNERS)]) for turn in (math.cos, math.sin)
+)
+
+
+def _each(function: Callable[[float], float], values: Floats) -> Floats:
+    """The function of each value: numpy's own may depend on where in an array a value stands."""
+    return np.fromiter(map(function, values.tolist()), dtype=np.float64, count=len(values))
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    x, y, z = a * b
+    found: Floats = x + y + z
+    return found
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _unit(vector: Floats) -> Floats:
-    length = math.sqrt(float(vector @ vector))
-    return vector / length if length > 0.0 else vector
+    """NaN for no direction."""
+    return vector / np.sqrt(_dot(vector, vector))
