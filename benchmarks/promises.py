@@ -40,7 +40,8 @@ FEW_POINTS: Final = 300
 FEW_HARD: Final = 40
 WAYS: Final = (
     *("fast_coarse_fused", "fast_fused", "fast", "single_complement_fused", "single_complement", "single_fused"),
-    *("single", "double_complement_fused", "double_complement", "double_fused", "double"),
+    *("fast_inner", "single_inner_fused", "single_inner", "single", "double_inner_fused", "double_inner"),
+    *("double_complement_fused", "double_complement", "double_fused", "double"),
 )
 REQUESTS: Final[tuple[dict[str, Any], ...]] = (
     *({"max_error": error} for error in (1e-3, 1e-6, 1e-9, 1e-14, 1e-15)),

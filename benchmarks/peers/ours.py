@@ -29,8 +29,11 @@ def level(accuracy: str, form: str, *, bake: bool) -> Factory:
 literal = level("literal", "float64", bake=False)
 double = level("double", "float64", bake=False)
 double_baked = level("double", "float64", bake=True)
+double_inner = level("double_inner", "float64", bake=False)
+double_inner_baked = level("double_inner", "float64", bake=True)
 single = level("single", "float32", bake=False)
 single_baked = level("single", "float32", bake=True)
+single_inner = level("single_inner", "float32", bake=False)
 fast = level("fast", "float32", bake=False)
 fast_baked = level("fast", "float32", bake=True)
 

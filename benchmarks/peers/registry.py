@@ -70,8 +70,11 @@ ENTRIES: Final = (
     _ours("literal", "literal"),
     _ours("double", "double", again=True),
     _ours("double, baked", "double_baked"),
+    _ours("double_inner", "double_inner"),
+    _ours("double_inner, baked", "double_inner_baked"),
     _ours("single", "single"),
     _ours("single, baked", "single_baked"),
+    _ours("single_inner", "single_inner"),
     _ours("fast", "fast"),
     _ours("fast, baked", "fast_baked"),
 )

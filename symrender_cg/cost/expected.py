@@ -27,6 +27,7 @@ MOVES: Final = {
     "tested": 4.0,
     "complement": 0.93,
     "side": 1.05,
+    "inner": 0.84,
     "fused": 0.97,
     "whole": 1.5,
     "lopsided": 1.1,

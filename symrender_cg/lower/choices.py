@@ -9,7 +9,7 @@ measured. Never done here: a measurement, a search.
     rows         tested: hit or miss settled, but no span is filled without a test
     rays         narrow: where the ray meets the surface also in float32 (needs an unsettled outline)
     formula      seed, lagrange: the seed's formula, or the textbook's with the discriminant as a cross product
-    highlight    complement: sin^2 as 1 - cos^2; side: as a cross product
+    highlight    complement: sin^2 as 1 - cos^2; side: as a cross product; inner: n.l and r.v from two inner products
     contraction  fused: the compiler may make one rounding of a * b + c
     passes       whole: a pixel's steps in one loop; lopsided: nothing is shared by the pixels at x and -x
 
@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
-from symrender_cg.lower.variants import VARIANTS, Variant
+from symrender_cg.lower.variants import INNER_FORMS, VARIANTS, Variant
 
 UNSTATED: Final = "none: a choice that was measured, see symrender_cg cost"
 
@@ -95,9 +95,15 @@ def _complement(given: Variant) -> Variant | None:
 
 
 def _side(given: Variant) -> Variant | None:
-    if given.settles or "complement" not in given.forms:
+    if given.settles or "complement" not in given.forms or "inner_products" in given.forms:
         return None
     return replace(given, forms=tuple(form for form in given.forms if form != "complement"))
+
+
+def _inner(given: Variant) -> Variant | None:
+    if given.settles or "mirrored_ray" not in given.forms or "inner_products" in given.forms:
+        return None
+    return replace(given, forms=(*INNER_FORMS, *(form for form in given.forms if form == "middle_facing")))
 
 
 def _fused(given: Variant) -> Variant | None:
@@ -123,6 +129,7 @@ CHOICES: Final[tuple[Choice, ...]] = (
     Choice("formula", "lagrange", "the textbook's formula, disc as a cross product", _formula(())),
     Choice("highlight", "complement", "sin^2 as 1 - cos^2", _complement, alone=False),
     Choice("highlight", "side", "sin^2 as a cross product", _side, alone=False),
+    Choice("highlight", "inner", "the light's terms from two inner products", _inner),
     Choice("contraction", "fused", "-ffp-contract=fast: a * b + c in one rounding", _fused, alone=False),
     Choice("passes", "whole", "a pixel's steps in one loop, not in short ones", _passes(fission=False, halves=False)),
     Choice("passes", "lopsided", "nothing shared by the pixels at x and -x", _passes(symmetry=False)),

@@ -27,7 +27,7 @@ _STABLE_FORMS = (
     "gained",
 )
 
-_INNER_FORMS = (
+INNER_FORMS = (
     *_STABLE_FORMS,
     "centred_foot_dot_lamp",
     "off_axis_foot_dot_lamp",
@@ -80,16 +80,6 @@ _SINGLE_FLOAT64 = frozenset(
         "focal",
         "plane_unit",
         *("height2", "row_low", "row_high", "ahead", "wide_facing", "hit_distance"),
-        *(
-            "gap_room",
-            "plain_gap",
-            "less_gap",
-            "least_gap",
-            "most_disc",
-            "most_half",
-            "outline_left",
-            "outline_right",
-        ),
         *("descent", "p_x", "p_y", "p_z", "tile_u", "tile_v", "tile", "parity"),
     }
 )
@@ -208,7 +198,7 @@ LEVELS: tuple[Variant, ...] = (
         "stable",
         "at most 4 ulp, for every valid scene: pixels whose own bound does not show that are reported",
         "pair",
-        _INNER_FORMS,
+        INNER_FORMS,
         exact=True,
         float64=_EXACT_NUMBERS,
         double_double=_DOUBLE_DOUBLE | _WIDE_LIGHT | _RENORMALISED,
@@ -219,7 +209,7 @@ LEVELS: tuple[Variant, ...] = (
         "certified_float64",
         "the float64 nearest to the true value; pixels whose own bound does not show that are reported",
         "pair",
-        _INNER_FORMS,
+        INNER_FORMS,
         exact=True,
         float64=_EXACT_NUMBERS,
         double_double=_DOUBLE_DOUBLE | _WIDE_LIGHT | _RENORMALISED,
@@ -230,7 +220,7 @@ LEVELS: tuple[Variant, ...] = (
             f"certified_{target}",
             f"{words}; pixels whose own bound does not show that are reported",
             "float64",
-            _INNER_FORMS,
+            INNER_FORMS,
             exact=True,
             double_double=_DOUBLE_DOUBLE,
             per_pixel_exact=_PER_PIXEL,
