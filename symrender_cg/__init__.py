@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from symrender_cg.pipeline import compile_kernel, statistics, translate
     from symrender_cg.run.batch import render_batch
     from symrender_cg.run.blocks import render_blocks
-    from symrender_cg.run.certify import Certificate, Certified
+    from symrender_cg.run.certificate import Certificate, Certified
     from symrender_cg.run.render import certify, evaluate, render_image, render_layers
     from symrender_cg.scene import (
         Camera,
@@ -56,8 +56,8 @@ _HOME = {
     "compile_kernel": "pipeline",
     "statistics": "pipeline",
     "translate": "pipeline",
-    "Certificate": "run.certify",
-    "Certified": "run.certify",
+    "Certificate": "run.certificate",
+    "Certified": "run.certificate",
     "Choice": "cost.choose",
     "choose": "cost.choose",
     "certify": "run.render",
@@ -116,7 +116,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    found = globals()[name] = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    return found
 
 
 def __dir__() -> list[str]:

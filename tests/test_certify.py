@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from c_harness import compile_c
 from evaluators import STRUCTURES, THOROUGH, same_bits, square_of_points
 from scene_strategies import random_scene, scene_points
 
@@ -20,11 +21,10 @@ from symrender_cg import certify, evaluate, render_image
 from symrender_cg.errors import AccuracyError, ArgumentError, OutsidePlanError
 from symrender_cg.pipeline import pixel_size, planned
 from symrender_cg.reference import oracle
-from symrender_cg.run import certify as stages
-from symrender_cg.run.certify import Certificate, Stage
-from symrender_cg.run.enclosure_kernel import Enclosure
+from symrender_cg.run.certificate import Certificate, Stage
+from symrender_cg.run.enclosure_kernel import RULES as BY_RULE
+from symrender_cg.run.enclosure_kernel import EnclosureKernel, SettledPoints
 from symrender_cg.run.grid import pixel_centres
-from symrender_cg.run.settling import settled
 from symrender_cg.scene import Phong, PointLight, Scene, Sphere
 from symrender_cg.stress.families import FAMILIES
 
@@ -231,11 +231,37 @@ def nearest_float32(value: Fraction) -> np.float32:
     return min(near, key=lambda f: (abs(Fraction(float(f)) - value), f.view(np.uint32) & 1))
 
 
+SETTLED_BY = """
+#include <stddef.h>
+#include "settle.h"
+
+void settle_all(double *values, unsigned char *is_settled, const double *hi, const double *lo, const double *error,
+    ptrdiff_t count, int rule)
+{
+    for (ptrdiff_t i = 0; i < count; ++i) {
+        const double_double v = {hi[i], lo[i]};
+        const settled_value found = settled_by((settling_rule)rule, v, error[i]);
+        values[i] = found.value;
+        is_settled[i] = (unsigned char)found.is_settled;
+    }
+}
+"""
+
+
+def settled(parts: Sequence[npt.NDArray[np.float64]], rule: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
+    """What templates/support/settle.h makes of enclosures hi, lo, error."""
+    prototype = SETTLED_BY[SETTLED_BY.index("void") : SETTLED_BY.index("\n{")] + ";"
+    values, is_settled = np.empty(len(parts[0])), np.empty(len(parts[0]), dtype=np.bool_)
+    library = compile_c(SETTLED_BY, prototype)
+    library.call("settle_all", values, is_settled.view(np.uint8), *parts, len(values), BY_RULE[rule])
+    return values, is_settled
+
+
 @pytest.mark.parametrize("rule", ["ulp", *TARGETS])
 def test_what_an_enclosure_settles_is_settled_right(rule: str) -> None:
     cases = enclosures(5, 20_000 if THOROUGH else 3_000)
     parts = [np.array([case[k] for case in cases]) for k in range(3)]
-    values, is_settled = settled(Enclosure(*parts), rule)
+    values, is_settled = settled(parts, rule)
     assert 0.2 < is_settled.mean() < 1.0
     for (hi, lo, error, true), value, ready in zip(cases, values, is_settled, strict=True):
         if not ready:
@@ -252,9 +278,10 @@ def test_what_an_enclosure_settles_is_settled_right(rule: str) -> None:
 
 
 def test_an_enclosure_that_knows_nothing_settles_nothing() -> None:
-    nothing = Enclosure(np.zeros(3), np.zeros(3), np.full(3, np.inf))
-    for rule in ("ulp", *TARGETS):
-        assert not settled(nothing, rule)[1].any()
+    for hi in (0.0, 0.3, 2.0):
+        nothing = [np.full(3, hi), np.zeros(3), np.full(3, np.inf)]
+        for rule in ("ulp", *TARGETS):
+            assert not settled(nothing, rule)[1].any()
 
 
 # ------------------------------------------------------------------------------------------------ arguments and errors
@@ -297,6 +324,11 @@ def test_arguments_that_do_not_go_together_are_refused_by_name() -> None:
             render_image("chapter1", 8, 8, accuracy=level, bake=True)
 
 
+def nothing_settled(kernel: EnclosureKernel, x: Any, y: Any, *_how: Any, **_more: Any) -> SettledPoints:
+    """As though no enclosure were narrow enough."""
+    return SettledPoints(np.zeros((x.size, kernel.channels)), np.zeros(x.size, dtype=np.bool_), 0.0)
+
+
 def test_what_the_oracle_leaves_open_is_an_error_that_names_the_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
     """The two stages before it settle nothing, and the oracle all but its third and fifth point."""
     scene = Scene.builtin("two_spheres")
@@ -304,11 +336,8 @@ def test_what_the_oracle_leaves_open_is_an_error_that_names_the_pixels(monkeypat
     def open_(scene: Scene, x: Any, y: Any, target: str = "float64", **_more: Any) -> Any:
         raise AccuracyError("2 points", (2, 4))
 
-    def nothing(found: Enclosure, rule: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
-        return settled(found, rule)[0], np.zeros(found.hi.shape, dtype=bool)
-
     monkeypatch.setattr(oracle, "settle", open_)
-    monkeypatch.setattr(stages, "settled", nothing)
+    monkeypatch.setattr(EnclosureKernel, "settle", nothing_settled)
     with pytest.raises(AccuracyError) as raised:
         render_image(scene, 4, 3, accuracy="certified")
     assert raised.value.points == (2, 4)
@@ -322,11 +351,8 @@ def test_many_open_pixels_are_shown_by_the_first_eight(monkeypatch: pytest.Monke
     def open_(scene: Scene, x: Any, y: Any, target: str = "float64", **_more: Any) -> Any:
         raise AccuracyError("all", tuple(range(len(x))))
 
-    def nothing(found: Enclosure, rule: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
-        return settled(found, rule)[0], np.zeros(found.hi.shape, dtype=bool)
-
     monkeypatch.setattr(oracle, "settle", open_)
-    monkeypatch.setattr(stages, "settled", nothing)
+    monkeypatch.setattr(EnclosureKernel, "settle", nothing_settled)
     with pytest.raises(AccuracyError, match="12 of 12 values are not settled: ") as raised:
         render_image("two_spheres", 4, 3, accuracy="certified", target="uint8")
     assert str(raised.value).count("column") == 8
@@ -336,11 +362,8 @@ def test_many_open_pixels_are_shown_by_the_first_eight(monkeypatch: pytest.Monke
 def test_what_the_enclosure_leaves_over_the_oracle_settles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Were the enclosure's bounds infinite, the values would be the same, and the certificate would say whose."""
 
-    def nothing(found: Enclosure, rule: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
-        return settled(found, rule)[0], np.zeros(found.hi.shape, dtype=bool)
-
     wanted = {target: certify("shadow", 10, 10, target=target).values for target in TARGETS}
-    monkeypatch.setattr(stages, "settled", nothing)
+    monkeypatch.setattr(EnclosureKernel, "settle", nothing_settled)
     for target in TARGETS:
         found = certify("shadow", 10, 10, target=target)
         assert same_bits(found.values, wanted[target])

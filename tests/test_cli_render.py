@@ -338,7 +338,7 @@ def test_a_certificate_that_cannot_be_given_names_the_pixels_with_exit_code_4(
     def undecided(scene: Scene, x: Any, y: Any, target: str) -> Any:
         raise AccuracyError("two values are open", (0, 13))
 
-    def nothing(job: Any, points: Any, places: Any, kernel: Any = None) -> Any:
+    def nothing(job: Any, points: Any, places: Any, threads: Any = None, kernel: Any = None) -> Any:
         return np.zeros((places.size, 1)), np.zeros(places.size, dtype=bool), 0.0
 
     monkeypatch.setattr(certify_module, "_enclosed", nothing)

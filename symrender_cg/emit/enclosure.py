@@ -91,7 +91,7 @@ def emit_enclosure(
     """C99 text of a scene's enclosure. `command` is the line that regenerates it."""
     fields = enclosure_fields(need)
     lines = field_lines(fields)
-    includes = ["inline.h", "units.h", "double_double.h", "ball.h"]
+    includes = ["inline.h", "units.h", "double_double.h", "ball.h", "settle.h"]
     includes += ["ball_power.h"] if need.specular else []
     includes += ["exact_sign.h"] if need.spheres or need.plane else []
     context: dict[str, object] = {

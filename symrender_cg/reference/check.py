@@ -43,7 +43,7 @@ from symrender_cg.reference.per_pixel import evaluate_per_pixel
 from symrender_cg.reference.points import Points
 from symrender_cg.reference.vectorised import evaluate_vectorised
 from symrender_cg.run import render
-from symrender_cg.run.certify import Job
+from symrender_cg.run.certificate import Job
 from symrender_cg.run.kernel import Kernel
 from symrender_cg.run.levels import job_of
 from symrender_cg.run.numbers import numbers_of

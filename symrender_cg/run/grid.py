@@ -11,3 +11,11 @@ def pixel_centres(width: int, height: int, pixel: float) -> tuple[NDArray[np.flo
     columns = (np.arange(width, dtype=np.float64) + 0.5 - 0.5 * width) * np.float64(pixel)
     rows = (0.5 * height - 0.5 - np.arange(height, dtype=np.float64)) * np.float64(pixel)
     return columns, rows
+
+
+def pixels_at(
+    column: NDArray[np.intp], row: NDArray[np.intp], width: int, height: int, pixel: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """x and y of some pixels, the same bits."""
+    side = np.float64(pixel)
+    return (column + (0.5 - 0.5 * width)) * side, ((0.5 * height - 0.5) - row) * side

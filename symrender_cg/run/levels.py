@@ -16,7 +16,7 @@ from typing import Literal
 from symrender_cg.errors import ArgumentError
 from symrender_cg.lower.variants import MOST_ROUNDOFFS, Variant, variant
 from symrender_cg.pipeline import planned
-from symrender_cg.run.certify import Job
+from symrender_cg.run.certificate import Job
 from symrender_cg.run.numbers import numbers_of
 from symrender_cg.run.steep import Box, roundoffs, steep_box
 from symrender_cg.scene import Scene

@@ -14,7 +14,8 @@ from symrender_cg.errors import ArgumentError, OutsidePlanError
 from symrender_cg.lower.variants import Variant
 from symrender_cg.pipeline import draw, pixel_size
 from symrender_cg.run.bounds import error_bounds
-from symrender_cg.run.certify import Certified, settle_image, settle_points
+from symrender_cg.run.certificate import Certified
+from symrender_cg.run.certify import settle_image, settle_points
 from symrender_cg.run.grid import pixel_centres
 from symrender_cg.run.levels import drawn_as, job_of
 from symrender_cg.run.ready import checked_out, ready, shape_of, side

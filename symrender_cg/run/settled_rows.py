@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symrender_cg.run.certify import FirstStage, Job, first_stage, settle_onto, settle_rows
+from symrender_cg.run.certificate import Job
+from symrender_cg.run.certify import FirstStage, first_stage, settle_onto, settle_rows
 from symrender_cg.run.kernel import rows_are_contiguous
 from symrender_cg.run.threads import MOST_PIXELS
 

@@ -17,23 +17,29 @@ from numpy.typing import NDArray
 from symrender_cg.pipeline import enclosure_kernel
 from symrender_cg.plan.stack import effects_of, is_stackable, weigh
 from symrender_cg.plan.stack_lists import decide
-from symrender_cg.run.certify import Job
-from symrender_cg.run.enclosure_kernel import EnclosureKernel, enclose_many
+from symrender_cg.run.certificate import Job
+from symrender_cg.run.enclosure_kernel import EnclosureKernel, settle_many
 from symrender_cg.run.grid import pixel_centres
-from symrender_cg.run.settling import settled
-from symrender_cg.run.stacking import stack_of_scenes, structures_of
+from symrender_cg.run.stack_structures import structures_of
+from symrender_cg.run.stacking import stack_of_scenes
 
 Places = NDArray[np.intp]
 
-MOST_ALIKE: Final = 64
-"""Scenes that are compared together: each is read, sphere by sphere."""
+MOST_ALIKE: Final = 256
+"""Scenes that are compared together, each read sphere by sphere; fewer of many spheres, by pairs of these."""
+
+MOST_PAIRS: Final = 1 << 19
+"""Pairs of spheres that are looked at together."""
 
 
 def enclosed_many(
     jobs: Sequence[Job], places: Sequence[Places], width: int, height: int, threads: int | None
 ) -> list[tuple[NDArray[Any], NDArray[np.bool_]]]:
     """For each job, the values of pixels row * width + column of its image, shape (pixels, channels of its enclosure),
-    and which of them are settled in every channel. Scenes of one structure are enclosed in one call."""
+    and which of them are settled in every channel. Scenes of one structure are enclosed in one call.
+
+    The jobs differ in their scenes alone.
+    """
     found: dict[int, tuple[NDArray[Any], NDArray[np.bool_]]] = {}
     for group in _groups(jobs, width / height):
         scenes = np.empty(len(group.members), group.kernel.structure)
@@ -43,12 +49,8 @@ def enclosed_many(
             for k, half_height in zip(group.members, group.half_heights, strict=True)
         ]
         x, y = [at for at, _ in points], [at for _, at in points]
-        for k, enclosure in zip(group.members, enclose_many(group.kernel, scenes, x, y, threads), strict=True):
-            rounded, is_settled = settled(enclosure, jobs[k].rule)
-            count = len(places[k])
-            if jobs[k].clip and rounded.dtype.kind == "f":
-                rounded = np.clip(rounded, 0, 1)
-            found[k] = rounded.reshape(count, -1), np.asarray(is_settled.reshape(count, -1).all(axis=1), dtype=np.bool_)
+        settled = settle_many(group.kernel, scenes, x, y, jobs[0].rule, jobs[0].white, threads)
+        found |= dict(zip(group.members, settled, strict=True))
     return [found[k] for k in range(len(jobs))]
 
 
@@ -79,7 +81,8 @@ def _groups(jobs: Sequence[Job], aspect: float) -> list[_Group]:
         job = jobs[left[0]]
         kernel = enclosure_kernel(job.scene, aspect=aspect, portable=job.portable, cache=job.cache)
         group = groups.setdefault((kernel.name, id(kernel.library)), _Group(kernel))
-        taken = _add_alike(group, kernel, jobs, left[:MOST_ALIKE])
+        together = max(1, min(MOST_ALIKE, MOST_PAIRS // (len(job.scene.spheres) ** 2 + 1)))
+        taken = _add_alike(group, kernel, jobs, left[:together])
         if not taken:
             half_height = kernel.plan.given.camera.half_height
             assert half_height is not None, "a camera-frame scene has its half_height"
@@ -95,7 +98,7 @@ def _add_alike(group: _Group, kernel: EnclosureKernel, jobs: Sequence[Job], left
     scene, found = jobs[left[0]].scene, kernel.plan
     if len(left) < 2 or kernel.nearer or not is_stackable(scene, found):
         return []
-    read = stack_of_scenes(scene, found, [jobs[k].scene for k in left])
+    read = stack_of_scenes(scene, [jobs[k].scene for k in left])
     if read is None:
         return []
     stack, kept = read
@@ -103,7 +106,7 @@ def _add_alike(group: _Group, kernel: EnclosureKernel, jobs: Sequence[Job], left
     chosen = np.flatnonzero(weighed.alike & (weighed.effects == effects_of(found)))
     members = [left[kept[k]] for k in chosen.tolist()]
     if members:
-        made, keeps = structures_of(kernel, kernel.numbers(), stack, decide(weighed, chosen))
+        made, keeps = structures_of(kernel, found.scene, kernel.numbers(), stack, decide(weighed, chosen))
         group.add(members, made, keeps, stack.half_height[chosen].tolist())
     return members
 
