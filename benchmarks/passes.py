@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from symrender_cg.lower.switches import ALL, NAMES, Passes
 from symrender_cg.lower.variants import variant
 from symrender_cg.pipeline import draw, pixel_size
-from symrender_cg.run.certify import Job, first_stage
+from symrender_cg.run.certificate import Job
+from symrender_cg.run.certify import first_stage
 from symrender_cg.scene import Scene
 
 PROVED = ("stable", "certified_float64", "certified_float32", "certified_uint8")

@@ -76,7 +76,7 @@ def test_a_function_that_is_nowhere_is_an_error() -> None:
 @pytest.mark.parametrize("accuracy", ["literal", "double", "single", "fast"])
 def test_no_operation_of_the_program_is_left_out(accuracy: str) -> None:
     found = translation(accuracy)
-    whole = replace(found, program=replace(found.program, stages=(), mirrored=0))
+    whole = replace(found, program=replace(found.program, stages=(), mirrored=0, twins=0))
     work = work_of(whole)
     steps: Counter[str] = Counter()
     for step in whole.program.at("pixel"):
@@ -87,14 +87,15 @@ def test_no_operation_of_the_program_is_left_out(accuracy: str) -> None:
     assert work.bytes == (8 if accuracy in ("literal", "double") else 4)
 
 
-def test_what_two_pixels_share_counts_half_for_each() -> None:
+@pytest.mark.parametrize(("twins", "part"), [(0, 0.5), (1, 0.25)])
+def test_what_pixels_share_counts_in_part_for_each(twins: int, part: float) -> None:
     found = translation("double")
     names = tuple(step.name for step in found.program.at("pixel"))
-    whole = work_of(replace(found, program=replace(found.program, stages=(), mirrored=0)))
-    shared = work_of(replace(found, program=replace(found.program, stages=(names,), mirrored=1)))
+    whole = work_of(replace(found, program=replace(found.program, stages=(), mirrored=0, twins=0)))
+    shared = work_of(replace(found, program=replace(found.program, stages=(names,), mirrored=1, twins=twins)))
     for key, count in whole.operations.items():
         outside = LOOP[key[1]] if key[0] == "float64" else 0
-        assert shared.operations[key] == pytest.approx(outside + 0.5 * (count - outside))
+        assert shared.operations[key] == pytest.approx(outside + part * (count - outside))
 
 
 def test_baking_the_exponent_takes_the_power_out() -> None:

@@ -42,6 +42,13 @@ UPDATE = "python -m pytest tests/test_golden.py --update"
 LONGEST_DIFF = 80
 
 
+def test_the_c_that_the_readme_shows_is_that_of_the_kernel_it_names() -> None:
+    shown = re.findall(r"^```c\n(.*?)^```", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)
+    kernel = set((GENERATED / "centred_sphere_double" / "centred_sphere_double.c").read_text().splitlines())
+    assert len(shown) == 3
+    assert not [line for block in shown for line in block.splitlines() if line not in kernel]
+
+
 def regenerated() -> dict[str, str]:
     """The texts of generated/ as the compiler writes them now, by their place in that folder."""
     texts: dict[str, str] = {}

@@ -22,10 +22,11 @@ from symrender_cg.lower.formats import convert_formats
 from symrender_cg.lower.freeze import freeze
 from symrender_cg.lower.program import KernelProgram, Step
 from symrender_cg.lower.switches import NAMES, Passes
-from symrender_cg.lower.symmetry import gather_mirrored, parities
+from symrender_cg.lower.symmetry import alike_in_twin_rows, gather_mirrored, parities
 from symrender_cg.lower.variants import Variant, variant
 from symrender_cg.pipeline import SphereTranslation, draw, translate
 from symrender_cg.reference import oracle
+from symrender_cg.run.pool import NativeRows
 from symrender_cg.scene import Scene
 
 LEVELS = ("fast", "single", "double")
@@ -186,6 +187,79 @@ def test_gathering_leaves_a_sphere_off_the_axis_alone() -> None:
     assert gather_mirrored(program) is program
 
 
+# ---- rows at y and -y
+
+
+@pytest.mark.parametrize(
+    ("steps", "alike"),
+    [
+        ((step("value", X**2 + Y**2),), {"value"}),
+        ((step("value", X * A),), {"value"}),
+        ((step("value", X + Y),), set()),
+        ((step("odd", X * Y), step("value", symbol("odd") ** 2)), set()),
+        ((step("even", X + Y**2), step("value", symbol("even") * Y)), {"even"}),
+    ],
+    ids=str,
+)
+def test_rows_share_what_does_not_change_with_the_sign_of_y(steps: tuple[Step, ...], alike: set[str]) -> None:
+    """An even step that is made of an odd one is left to each row, which has the odd one to itself."""
+    program = span_program(*steps)
+    even = program.map({"reach": symbol("b") + Y**2})
+    assert alike_in_twin_rows(freeze(even)) == alike
+    assert alike_in_twin_rows(freeze(program)) == frozenset(), "the hits of the two rows end elsewhere"
+    assert alike_in_twin_rows(replace(freeze(even), ends=None)) == frozenset()
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_only_spheres_on_the_axis_have_twin_rows(level: str) -> None:
+    for name in STRUCTURES:
+        program = translated(name, level).program
+        assert (program.twins > 0) == (name in CENTRED), name
+        shared = {entry for stage in program.stages[: program.twins] for entry in stage}
+        assert shared <= alike_in_twin_rows(program)
+        assert ("_row_pairs" in translated(name, level).emitted.cdef) == (name in CENTRED)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("height", [1, 2, 7, 12])
+def test_any_range_of_rows_has_the_bits_of_the_image_and_writes_no_other_row(level: str, height: int) -> None:
+    drawing = draw(STRUCTURES["centred_sphere"], level, size=(37, height))
+    whole = np.empty((height, 37), drawing.dtype)
+    drawing.rows(whole, 0, height)
+    for begin, end in itertools.combinations(range(height + 1), 2):
+        image = np.full((height, 37), -7.0, drawing.dtype)
+        drawing.rows(image, begin, end)
+        assert same_bits(image[begin:end], whole[begin:end]), (begin, end)
+        assert (image[:begin] == -7.0).all(), (begin, end)
+        assert (image[end:] == -7.0).all(), (begin, end)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_rows_that_share_have_the_bits_of_rows_that_do_not(level: str) -> None:
+    scene = STRUCTURES["centred_sphere"]
+    for width, height in ((64, 48), (301, 33)):
+        image, _ = image_and_points(scene, level, width, height)
+        alone, _ = image_and_points(scene, without(level, "twins"), width, height)
+        assert same_bits(image, alone)
+
+
+@pytest.mark.parametrize("height", [5, 8])
+def test_a_folded_image_is_drawn_from_both_ends(height: int) -> None:
+    drawing = draw(STRUCTURES["centred_sphere"], "double", size=(16, height))
+    image, whole = np.full((height, 16), -7.0), np.empty((height, 16))
+    drawing.rows(whole, 0, height)
+    rows = drawing.onto(image)
+    assert isinstance(rows, NativeRows)
+    folded = rows.folded(0, height)
+    assert folded is not None
+    folded(1, 2)
+    drawn = [1, height - 2]
+    assert same_bits(image[drawn], whole[drawn])
+    assert (np.delete(image, drawn, axis=0) == -7.0).all()
+    assert rows.folded(0, height - 1) is None, "a part of the image"
+    assert folded.folded(0, height) is None, "folded once"
+
+
 # ---- stages
 
 
@@ -247,9 +321,9 @@ def test_cuts_are_the_cheapest_there_are(level: str) -> None:
 def test_cutting_leaves_its_input_untouched_and_gives_the_same_again(name: str) -> None:
     program = translated(name, "double").program
     text = program.text()
-    assert cut(program, fission=True, symmetry=True) == program
+    assert cut(program, fission=True, symmetry=True, twins=True) == program
     assert program.text() == text
-    assert len(cut(replace(program, shortcut=None), fission=False, symmetry=False).stages) == 1
+    assert len(cut(replace(program, shortcut=None), fission=False, symmetry=False, twins=False).stages) == 1
 
 
 # ---- switches
@@ -266,7 +340,9 @@ def test_fission_changes_no_bit(name: str, level: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "off", [("symmetry",), ("halves",), ("anchors",), ("prefetch",), ("symmetry", "fission"), NAMES], ids=" ".join
+    "off",
+    [("symmetry",), ("twins",), ("halves",), ("anchors",), ("prefetch",), ("symmetry", "fission"), NAMES],
+    ids=" ".join,
 )
 @pytest.mark.parametrize("level", LEVELS)
 def test_each_pass_can_be_left_out_and_the_promise_stands(level: str, off: tuple[str, ...]) -> None:

@@ -353,7 +353,11 @@ def test_large_images_are_drawn_round_by_round(row_by_row: None, monkeypatch: py
     monkeypatch.setattr(NativeRows, "share", noted)
     bound, image = draw(Scene.chapter1(), size=(64, 64), clip=True), np.full((64, 64), np.nan)
     over_rows(bound.onto(image), 64, 2, width=64)
-    assert rounds == [(begin, min(begin + 10, 64)) for begin in range(0, 64, 10)]
+    assert rounds == [(begin, min(begin + 5, 32)) for begin in range(0, 32, 5)], "folded: 32 rows of 128 pixels"
+    assert same_bits(image, one)
+    rounds.clear()
+    over_rows(bound.onto(image[1:], 1), 63, 2, width=64, first=1)
+    assert rounds == [(begin, min(begin + 10, 64)) for begin in range(1, 64, 10)], "a part of the image"
     assert same_bits(image, one)
 
 

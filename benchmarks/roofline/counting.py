@@ -65,7 +65,8 @@ def work_of(translation: SphereTranslation) -> Work:
     """The work of the kernel of one sphere. Raises ArgumentError for a call whose function is nowhere."""
     functions = functions_of(translation.emitted.files)
     program = translation.program
-    shared = {name for stage in program.stages[: program.mirrored] for name in stage}
+    share = {name: 0.5 for stage in program.stages[: program.mirrored] for name in stage}
+    share |= {name: 0.25 for stage in program.stages[: program.twins] for name in stage}
     total: dict[tuple[str, str], float] = {("float64", kind): float(count) for kind, count in LOOP.items()}
     for step in program.at("pixel"):
         counts: Counter[str] = Counter()
@@ -77,7 +78,7 @@ def work_of(translation: SphereTranslation) -> Work:
                 counts += operations_in(node.function, functions)
         for kind, count in counts.items():
             key = step.format, kind
-            total[key] = total.get(key, 0.0) + (0.5 * count if step.name in shared else count)
+            total[key] = total.get(key, 0.0) + share.get(step.name, 1.0) * count
     size = 4 if translation.emitted.result_type == "float" else 8
     return Work(total, size, program.ends is None)
 

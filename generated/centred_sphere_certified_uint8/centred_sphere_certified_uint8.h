@@ -37,7 +37,21 @@ ptrdiff_t centred_sphere_certified_uint8_rows(
     const centred_sphere_certified_uint8_scene *scene,
     int row_begin, int row_end, ptrdiff_t *unsettled);
 
-/* The same for points (x[i], y[i]) of the image plane; above white they are written as white. */
+/* The same for rows j and height - 1 - j, row_begin <= j < row_end <= (height + 1) / 2: those at y and -y share what
+ * they have in common, as they do in centred_sphere_certified_uint8_rows where both are asked for. */
+ptrdiff_t centred_sphere_certified_uint8_row_pairs(
+    unsigned char *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_certified_uint8_scene *scene,
+    int row_begin, int row_end, ptrdiff_t *unsettled);
+
+/* Writes the pixels of a box alone that lie in rows [row_begin, row_end); the others of the image stay as they are.
+ * `unsettled`, and what is returned, as for rows, with room for the pixels of the box in these rows. */
+ptrdiff_t centred_sphere_certified_uint8_box(
+    unsigned char *image, ptrdiff_t stride, const symrender_box *box,
+    const centred_sphere_certified_uint8_scene *scene,
+    int row_begin, int row_end, ptrdiff_t *unsettled);
+
+/* As for rows, at points (x[i], y[i]) of the image plane; above white they are written as white. */
 ptrdiff_t centred_sphere_certified_uint8_points(
     unsigned char *values, const double *x, const double *y, ptrdiff_t count, double white,
     const centred_sphere_certified_uint8_scene *scene, ptrdiff_t *unsettled);
@@ -57,6 +71,12 @@ double centred_sphere_certified_uint8_bound(
 ptrdiff_t centred_sphere_certified_uint8_batch(
     unsigned char *images, ptrdiff_t image_stride, ptrdiff_t stride,
     const symrender_grid *grids, const centred_sphere_certified_uint8_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled);
+
+/* The same for a box of each image. */
+ptrdiff_t centred_sphere_certified_uint8_boxes(
+    unsigned char *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_box *boxes, const centred_sphere_certified_uint8_scene *scenes,
     ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled);
 
 #ifdef __cplusplus

@@ -16,7 +16,8 @@
  * ops      once: frame 5 mul 3 div 1 select 23 call
  *          a row: 1 mul 5 call
  *          a pixel: 43 mul 31 add 2 div 2 sqrt 2 max 3 select 2 call
- *          of these, once for two of them, at x and -x: 25 mul 18 add 1 div 1 sqrt 1 max 1 select
+ *          of these, once for four of them, at x and -x, y and -y: 17 mul 14 add 1 div 1 sqrt 1 max 1 select
+ *          and once for two, at x and -x: 8 mul 4 add
  */
 #include "centred_sphere_double.h"
 
@@ -34,8 +35,8 @@ enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first lev
 /* What does not change within a frame. */
 typedef struct {
     int half_exponent;
-    double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, middle_s, facing2_middle_frame,
-        along_frame, diffuse_gain, k_ambient, shininess;
+    double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, middle_s, focal2, along_frame,
+        diffuse_gain, k_ambient, shininess;
     double_double alpha, rho2, depth, depth2, depth_focal;
 } frame;
 
@@ -77,7 +78,7 @@ static frame frame_of(const centred_sphere_double_scene *scene)
     const double_double depth = dd_div(dd_from(eye), dd_from(radius));
 
     /* ray and sphere [1 mul] */
-    const double facing2_middle_frame = focal * focal;   /* what is the same for a frame in facing2_middle */
+    const double focal2 = focal * focal;
 
     /* normal [1 mul] */
     const double along_frame = focal * depth.hi;   /* what is the same for a frame in along */
@@ -102,7 +103,7 @@ static frame frame_of(const centred_sphere_double_scene *scene)
         .rho2 = rho2,
         .middle_s = middle_s,
         .depth = depth,
-        .facing2_middle_frame = facing2_middle_frame,
+        .focal2 = focal2,
         .along_frame = along_frame,
         .diffuse_gain = diffuse_gain,
         .depth2 = depth2,
@@ -115,14 +116,14 @@ static frame frame_of(const centred_sphere_double_scene *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double y, s_row;
+    double y, y2;
     double_double x_left, x_right;
 } row;
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
 {
     /* ray and sphere [1 mul] */
-    const double s_row = y * y;   /* what is the same for a row in s */
+    const double y2 = y * y;
 
     /* silhouette [5 call] */
     /* the row's hits are -reach <= x <= reach */
@@ -131,7 +132,7 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const double_double x_right = reach;
 
     const row r = {
-        .y = y, .s_row = s_row, .x_left = x_left, .x_right = x_right,
+        .y = y, .y2 = y2, .x_left = x_left, .x_right = x_right,
     };
     return r;
 }
@@ -160,9 +161,8 @@ static inline double certainty(double facing2, double d_dot_d)
 SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *sure)
 {
     /* ray and sphere [4 mul 8 add 1 select] */
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    /* disc / R^2 where that takes little from f^2 */
-    const double facing2_middle = f->facing2_middle_frame - s * f->alpha.hi;
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double facing2_middle = f->focal2 - s * f->alpha.hi;   /* disc / R^2 where that takes little from f^2 */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
@@ -170,7 +170,7 @@ SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *su
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double facing2_edge = f->alpha.hi * chord;
     const double facing2 = f->middle_s - s > 0.0 ? facing2_middle : facing2_edge;
-    const double d_dot_d = s + f->facing2_middle_frame;
+    const double d_dot_d = s + f->focal2;
 
     *sure = certainty(facing2, d_dot_d);
     return facing2;
@@ -188,20 +188,18 @@ static int is_hit(double column, double plane_y, const row *r, const frame *f, d
 
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
-    double x[POINTS], s[POINTS], facing2[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w_y[POINTS], w_z[POINTS],
-        w2_even[POINTS], n_dot_l_even[POINTS], mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS],
-        w_dot_mirror_even[POINTS], inv_d6[POINTS], w2[POINTS], diffuse[POINTS], w_dot_mirror[POINTS], cos2[POINTS],
+    double x[POINTS], s[POINTS], facing2[POINTS], along[POINTS], n_x[POINTS], n_z[POINTS], w_z[POINTS], spread[POINTS],
+        mirror_x[POINTS], mirror_z[POINTS], inv_d6[POINTS], w_y[POINTS], w2_even[POINTS], n_dot_l_even[POINTS],
+        mirror_y[POINTS], w_dot_mirror_even[POINTS], w2[POINTS], diffuse[POINTS], w_dot_mirror[POINTS], cos2[POINTS],
         sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
 } block;
 
-/* Stage 1, the same for x and -x: ray and sphere, normal [4 mul 8 add 1 div 1 sqrt 1 max 1 select]. Leaves x, s,
- * facing2, facing, inv_d2. */
+/* Stage 1, the same for x and -x, y and -y: ray and sphere [4 mul 7 add 1 select]. Leaves x, s, facing2. */
 SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
-    /* ray and sphere [4 mul 8 add 1 sqrt 1 max 1 select] */
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    /* disc / R^2 where that takes little from f^2 */
-    const double facing2_middle = f->facing2_middle_frame - s * f->alpha.hi;
+    /* ray and sphere [4 mul 7 add 1 select] */
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double facing2_middle = f->focal2 - s * f->alpha.hi;   /* disc / R^2 where that takes little from f^2 */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
     const double to_right = r->x_right.hi - x + r->x_right.lo;
@@ -209,64 +207,79 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, 
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double facing2_edge = f->alpha.hi * chord;
     const double facing2 = f->middle_s - s > 0.0 ? facing2_middle : facing2_edge;
-    const double d_dot_d = s + f->facing2_middle_frame;
-    const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
-
-    /* normal [1 div] */
-    const double inv_d2 = 1.0 / d_dot_d;
 
     b->x[i] = x;
     b->s[i] = s;
     b->facing2[i] = facing2;
-    b->facing[i] = facing;
-    b->inv_d2[i] = inv_d2;
 }
 
-/* Stage 2, the same for x and -x: normal, light, specular [21 mul 10 add]. Leaves n_x, w_y, w_z, w2_even,
- * n_dot_l_even, mirror_x, mirror_y, mirror_z, w_dot_mirror_even, inv_d6. */
-SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
+/* Stage 2, the same for x and -x, y and -y: ray and sphere, normal, light, specular [13 mul 7 add 1 div 1 sqrt 1
+ * max]. Leaves along, n_x, n_z, w_z, spread, mirror_x, mirror_z, inv_d6. */
+SYMRENDER_INLINE void stage_2(const frame *f, block *b, int i)
 {
-    /* normal [6 mul 2 add] */
-    const double along = b->inv_d2[i] * (f->along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    /* ray and sphere [1 add 1 sqrt 1 max] */
+    const double d_dot_d = b->s[i] + f->focal2;
+    /* -n.D, how far the surface faces the ray: root / R */
+    const double facing = sqrt(b->facing2[i] > 0.0 ? b->facing2[i] : 0.0);
+
+    /* normal [5 mul 2 add 1 div] */
+    const double inv_d2 = 1.0 / d_dot_d;
+    const double along = inv_d2 * (f->along_frame - facing);   /* t / R: n = (t x, t y, e (1 - t)) / R */
     const double n_x = b->x[i] * along;
-    const double n_y = r->y * along;
     const double share_1 = b->s[i] * f->depth.hi;
-    const double n_z = b->inv_d2[i] * (f->focal * b->facing[i] + share_1);   /* a sum, where e (1 - t) would cancel */
+    const double n_z = inv_d2 * (f->focal * facing + share_1);   /* a sum, where e (1 - t) would cancel */
 
-    /* light [4 mul 4 add] */
-    const double w_y = f->lamp_y - n_y;
+    /* light [1 add] */
     const double w_z = f->lamp_z - n_z;
-    const double w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
-    const double n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
 
-    /* specular [11 mul 4 add] */
-    const double bounce = 2.0 * b->facing[i];
+    /* specular [8 mul 3 add] */
+    const double bounce = 2.0 * facing;
     const double gap2 = b->s[i] * f->depth2.hi;   /* |m x D|^2 in radii = |D|^2 - facing^2, free of cancellation */
     const double turn = gap2 - b->facing2[i];   /* -|D|^2 cos 2a, a the angle of incidence */
     const double spread = turn + bounce * f->depth_focal.hi;
     /* the primary ray mirrored at the surface, times |D|^2: turn D + bounce F, F = kappa (f x, f y, s) */
     const double mirror_x = b->x[i] * spread;
-    const double mirror_y = r->y * spread;
     const double mirror_z = share_1 * bounce - f->focal * turn;
-    const double w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
-    const double inv_d4 = b->inv_d2[i] * b->inv_d2[i];
-    const double inv_d6 = b->inv_d2[i] * inv_d4;   /* 1 / |mirror|^2 */
+    const double inv_d4 = inv_d2 * inv_d2;
+    const double inv_d6 = inv_d2 * inv_d4;   /* 1 / |mirror|^2 */
 
+    b->along[i] = along;
     b->n_x[i] = n_x;
-    b->w_y[i] = w_y;
+    b->n_z[i] = n_z;
     b->w_z[i] = w_z;
-    b->w2_even[i] = w2_even;
-    b->n_dot_l_even[i] = n_dot_l_even;
+    b->spread[i] = spread;
     b->mirror_x[i] = mirror_x;
-    b->mirror_y[i] = mirror_y;
     b->mirror_z[i] = mirror_z;
-    b->w_dot_mirror_even[i] = w_dot_mirror_even;
     b->inv_d6[i] = inv_d6;
 }
 
-/* Stage 3: light, diffuse, specular [17 mul 11 add 1 div 1 sqrt 1 max]. Leaves w2, diffuse, w_dot_mirror, cos2,
+/* Stage 3, the same for x and -x: normal, light, specular [8 mul 4 add]. Leaves w_y, w2_even, n_dot_l_even,
+ * mirror_y, w_dot_mirror_even. */
+SYMRENDER_INLINE void stage_3(const row *r, const frame *f, block *b, int i)
+{
+    /* normal [1 mul] */
+    const double n_y = r->y * b->along[i];
+
+    /* light [4 mul 3 add] */
+    const double w_y = f->lamp_y - n_y;
+    const double w2_even = w_y * w_y + b->w_z[i] * b->w_z[i];   /* what x and -x share in w2 */
+    const double n_dot_l_even = n_y * w_y + b->n_z[i] * b->w_z[i];   /* what x and -x share in n_dot_l */
+
+    /* specular [3 mul 1 add] */
+    const double mirror_y = r->y * b->spread[i];
+    /* what x and -x share in w_dot_mirror */
+    const double w_dot_mirror_even = w_y * mirror_y + b->w_z[i] * b->mirror_z[i];
+
+    b->w_y[i] = w_y;
+    b->w2_even[i] = w2_even;
+    b->n_dot_l_even[i] = n_dot_l_even;
+    b->mirror_y[i] = mirror_y;
+    b->w_dot_mirror_even[i] = w_dot_mirror_even;
+}
+
+/* Stage 4: light, diffuse, specular [17 mul 11 add 1 div 1 sqrt 1 max]. Leaves w2, diffuse, w_dot_mirror, cos2,
  * sin2. */
-SYMRENDER_INLINE void stage_3(double side, const frame *f, block *b, int i)
+SYMRENDER_INLINE void stage_4(double side, const frame *f, block *b, int i)
 {
     const double n_x = side * b->n_x[i];
     const double mirror_x = side * b->mirror_x[i];
@@ -301,8 +314,8 @@ SYMRENDER_INLINE void stage_3(double side, const frame *f, block *b, int i)
     b->sin2[i] = sin2;
 }
 
-/* Stage 4: specular [1 call]. Leaves highlight_log2. */
-SYMRENDER_INLINE void stage_4(block *b, int i)
+/* Stage 5: specular [1 call]. Leaves highlight_log2. */
+SYMRENDER_INLINE void stage_5(block *b, int i)
 {
     /* specular [1 call] */
     const double highlight_log2 = log2_of_lobe(b->cos2[i], b->sin2[i]);   /* log2 (r.v)^2 */
@@ -310,8 +323,8 @@ SYMRENDER_INLINE void stage_4(block *b, int i)
     b->highlight_log2[i] = highlight_log2;
 }
 
-/* Stage 5: specular [1 call]. Leaves highlight. */
-SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
+/* Stage 6: specular [1 call]. Leaves highlight. */
+SYMRENDER_INLINE void stage_6(const frame *f, block *b, int i)
 {
     /* specular [1 call]. Phong 1975, Illumination for computer generated pictures */
     const double highlight = power_of_lobe(b->highlight_log2[i], f->shininess);   /* max(0, r.v)^n where r.v > 0 */
@@ -319,8 +332,8 @@ SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
     b->highlight[i] = highlight;
 }
 
-/* Stage 6: specular, intensity [1 mul 2 add 2 select]. Leaves value. */
-SYMRENDER_INLINE void stage_6(const frame *f, block *b, int i)
+/* Stage 7: specular, intensity [1 mul 2 add 2 select]. Leaves value. */
+SYMRENDER_INLINE void stage_7(const frame *f, block *b, int i)
 {
     const double highlight = b->highlight[i];
     const double zero_power = f->zero_power;
@@ -340,17 +353,17 @@ SYMRENDER_INLINE void stage_6(const frame *f, block *b, int i)
 SYMRENDER_INLINE void finish(double side, int count, const row *r, const frame *f, block *b)
 {
     for (int i = 0; i < count; ++i)
-        stage_3(side, f, b, i);
+        stage_4(side, f, b, i);
     if (f->half_exponent > 0) {
         whole_powers_of_lobe(b->sin2, b->highlight_log2, b->highlight, f->half_exponent, count);
     } else {
         for (int i = 0; i < count; ++i)
-            stage_4(b, i);
+            stage_5(b, i);
         for (int i = 0; i < count; ++i)
-            stage_5(f, b, i);
+            stage_6(f, b, i);
     }
     for (int i = 0; i < count; ++i)
-        stage_6(f, b, i);
+        stage_7(f, b, i);
     (void)r;
 }
 
@@ -359,24 +372,30 @@ static inline double at_most(double intensity, double white)
     return intensity > white ? white : intensity;
 }
 
-void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
-    const centred_sphere_double_scene *scene, int row_begin, int row_end)
+/* Rows [row_begin, row_end), and where `twins` is not 0 those at -y with them: what does not change with the sign of y
+ * is computed once for both. */
+static void draw_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_double_scene *scene, int row_begin, int row_end, int twins)
 {
+    if (row_begin >= row_end)
+        return;
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;
     const double pixel = grid->pixel, step = pixel * unit;
     const double left = 0.5 - 0.5 * grid->width, top = 0.5 * grid->height - 0.5;
     const double white = grid->white;
     const double background = at_most(scene->background, white);
-    const int width = grid->width;
+    const int width = grid->width, height = grid->height;
     block b SYMRENDER_ALIGNED;
     row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
-        double *restrict out = image + j * stride;
+        const int rows = twins && 2 * j + 1 != height ? 2 : 1;
+        double *const row_at[2] = {image + j * stride, image + (height - 1 - j) * stride};
         const double plane_y = (top - j) * pixel;
         const row r = next;
         next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
+        const row r_of[2] = {r, rows == 2 ? row_of(-plane_y * unit, &f) : r};
 
         /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
          * closed form and settled by an exact test */
@@ -388,14 +407,20 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
 
         const int end = last >= width / 2 ? last + 1 : width;
         const int begin = last >= width / 2 ? width - end : width;
-        if (j + 1 < row_end)
-            fetch_ahead(out + stride, (size_t)width * sizeof *out);
+        if (j + 1 < row_end) {
+            fetch_ahead(row_at[0] + stride, (size_t)width * sizeof *image);
+            if (twins)
+                fetch_ahead(row_at[1] - stride, (size_t)width * sizeof *image);
+        }
         /* the background, in whole vectors: it may run into the hits, which are written over it */
         const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
-        for (int i = 0; i < before; ++i)
-            out[i] = background;
-        for (int i = vectors_begin(end); i < width; ++i)
-            out[i] = background;
+        for (int k = 0; k < rows; ++k) {
+            double *restrict out = row_at[k];
+            for (int i = 0; i < before; ++i)
+                out[i] = background;
+            for (int i = vectors_begin(end); i < width; ++i)
+                out[i] = background;
+        }
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
@@ -403,15 +428,38 @@ void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender
             for (int i = 0; i < vectors; ++i)
                 stage_1((at + i + left) * step, &r, &f, &b, i);
             for (int i = 0; i < vectors; ++i)
-                stage_2(&r, &f, &b, i);
-            finish(1.0, vectors, &r, &f, &b);
-            for (int i = 0; i < count; ++i)
-                out[at + i] = at_most(b.value[i], white);
-            finish(-1.0, vectors, &r, &f, &b);
-            for (int i = 0; i < count; ++i)
-                out[width - 1 - at - i] = at_most(b.value[i], white);
+                stage_2(&f, &b, i);
+            for (int k = 0; k < rows; ++k) {
+                double *restrict out = row_at[k];
+                for (int i = 0; i < vectors; ++i)
+                    stage_3(&r_of[k], &f, &b, i);
+                finish(1.0, vectors, &r_of[k], &f, &b);
+                for (int i = 0; i < count; ++i)
+                    out[at + i] = at_most(b.value[i], white);
+                finish(-1.0, vectors, &r_of[k], &f, &b);
+                for (int i = 0; i < count; ++i)
+                    out[width - 1 - at - i] = at_most(b.value[i], white);
+            }
         }
     }
+}
+
+void centred_sphere_double_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_double_scene *scene, int row_begin, int row_end)
+{
+    /* rows [first, last) have their twins among them */
+    const int height = grid->height, first = row_begin > height - row_end ? row_begin : height - row_end;
+    const int last = height - first;
+
+    draw_rows(image, stride, grid, scene, row_begin, first < last ? first : row_end, 0);
+    draw_rows(image, stride, grid, scene, first, first < last ? height - height / 2 : first, 1);
+    draw_rows(image, stride, grid, scene, first < last ? last : row_end, row_end, 0);
+}
+
+void centred_sphere_double_row_pairs(double *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_double_scene *scene, int row_begin, int row_end)
+{
+    draw_rows(image, stride, grid, scene, row_begin, row_end, 1);
 }
 
 void centred_sphere_double_points(double *values, const double *x, const double *y,
@@ -432,22 +480,24 @@ void centred_sphere_double_points(double *values, const double *x, const double 
             facing[i] = sight(block_x[i] * unit, &r, &f, &doubt[i]);
             stage_1(block_x[i] * unit, &r, &f, &b, i);
         }
+        for (int i = 0; i < length; ++i)
+            stage_2(&f, &b, i);
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit, &f);
-            stage_2(&r, &f, &b, i);
+            stage_3(&r, &f, &b, i);
         }
         for (int i = 0; i < length; ++i)
-            stage_3(1.0, &f, &b, i);
+            stage_4(1.0, &f, &b, i);
         if (f.half_exponent > 0) {
             whole_powers_of_lobe(b.sin2, b.highlight_log2, b.highlight, f.half_exponent, length);
         } else {
             for (int i = 0; i < length; ++i)
-                stage_4(&b, i);
+                stage_5(&b, i);
             for (int i = 0; i < length; ++i)
-                stage_5(&f, &b, i);
+                stage_6(&f, &b, i);
         }
         for (int i = 0; i < length; ++i)
-            stage_6(&f, &b, i);
+            stage_7(&f, &b, i);
         for (int i = 0; i < length; ++i)
             out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background, white);
         for (int i = 0; i < length; ++i)

@@ -17,7 +17,8 @@
  * ops      at build time: frame 5 call
  *          a row: 1 mul 5 call
  *          a pixel: 41 mul 32 add 2 div 2 sqrt 2 max 4 select 4 call
- *          of these, once for two of them, at x and -x: 23 mul 18 add 1 div 1 sqrt 1 max 1 select
+ *          of these, once for four of them, at x and -x, y and -y: 15 mul 14 add 1 div 1 sqrt 1 max 1 select
+ *          and once for two, at x and -x: 8 mul 4 add
  */
 #include "centred_sphere_double_baked.h"
 
@@ -50,14 +51,14 @@ static const double specular_gain = 0.5;   /* I_L k_s */
 
 /* What does not change within a row. */
 typedef struct {
-    double y, s_row;
+    double y, y2;
     double_double x_left, x_right;
 } row;
 
 SYMRENDER_INLINE row row_of(double y)
 {
     /* ray and sphere [1 mul] */
-    const double s_row = y * y;   /* what is the same for a row in s */
+    const double y2 = y * y;
 
     /* silhouette [5 call] */
     /* the row's hits are -reach <= x <= reach */
@@ -66,7 +67,7 @@ SYMRENDER_INLINE row row_of(double y)
     const double_double x_right = reach;
 
     const row r = {
-        .y = y, .s_row = s_row, .x_left = x_left, .x_right = x_right,
+        .y = y, .y2 = y2, .x_left = x_left, .x_right = x_right,
     };
     return r;
 }
@@ -95,7 +96,7 @@ static inline double certainty(double facing2, double d_dot_d)
 SYMRENDER_INLINE double sight(double x, const row *r, double *sure)
 {
     /* ray and sphere [4 mul 8 add 1 select] */
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double facing2_middle = 1.0 - s * alpha.hi;   /* disc / R^2 where that takes little from f^2 */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
@@ -121,18 +122,17 @@ static int is_hit(double column, double plane_y, const row *r, double pixel, dou
 
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
-    double x[POINTS], s[POINTS], facing2[POINTS], d_dot_d[POINTS], facing[POINTS], n_x[POINTS], w_y[POINTS],
-        w_z[POINTS], w2_even[POINTS], n_dot_l_even[POINTS], mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS],
-        w_dot_mirror_even[POINTS], inv_d6[POINTS], w_x[POINTS], w2[POINTS], inv_w2[POINTS], diffuse[POINTS],
+    double x[POINTS], s[POINTS], facing2[POINTS], along[POINTS], n_x[POINTS], n_z[POINTS], w_z[POINTS], spread[POINTS],
+        mirror_x[POINTS], mirror_z[POINTS], inv_d6[POINTS], w_y[POINTS], w2_even[POINTS], n_dot_l_even[POINTS],
+        mirror_y[POINTS], w_dot_mirror_even[POINTS], w_x[POINTS], w2[POINTS], inv_w2[POINTS], diffuse[POINTS],
         value[POINTS];
 } block;
 
-/* Stage 1, the same for x and -x: ray and sphere [4 mul 8 add 1 sqrt 1 max 1 select]. Leaves x, s, facing2, d_dot_d,
- * facing. */
+/* Stage 1, the same for x and -x, y and -y: ray and sphere [4 mul 7 add 1 select]. Leaves x, s, facing2. */
 SYMRENDER_INLINE void stage_1(double x, const row *r, block *b, int i)
 {
-    /* ray and sphere [4 mul 8 add 1 sqrt 1 max 1 select] */
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    /* ray and sphere [4 mul 7 add 1 select] */
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double facing2_middle = 1.0 - s * alpha.hi;   /* disc / R^2 where that takes little from f^2 */
     /* distance to the two ends of the span, not negative inside it */
     const double from_left = x - r->x_left.hi - r->x_left.lo;
@@ -141,61 +141,78 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, block *b, int i)
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double facing2_edge = alpha.hi * chord;
     const double facing2 = middle_s - s > 0.0 ? facing2_middle : facing2_edge;
-    const double d_dot_d = s + 1.0;
-    const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
     b->x[i] = x;
     b->s[i] = s;
     b->facing2[i] = facing2;
-    b->d_dot_d[i] = d_dot_d;
-    b->facing[i] = facing;
 }
 
-/* Stage 2, the same for x and -x: normal, light, specular [19 mul 10 add 1 div]. Leaves n_x, w_y, w_z, w2_even,
- * n_dot_l_even, mirror_x, mirror_y, mirror_z, w_dot_mirror_even, inv_d6. */
-SYMRENDER_INLINE void stage_2(const row *r, block *b, int i)
+/* Stage 2, the same for x and -x, y and -y: ray and sphere, normal, light, specular [11 mul 7 add 1 div 1 sqrt 1
+ * max]. Leaves along, n_x, n_z, w_z, spread, mirror_x, mirror_z, inv_d6. */
+SYMRENDER_INLINE void stage_2(block *b, int i)
 {
-    /* normal [5 mul 2 add 1 div] */
-    const double inv_d2 = 1.0 / b->d_dot_d[i];
-    const double along = inv_d2 * (along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    /* ray and sphere [1 add 1 sqrt 1 max] */
+    const double d_dot_d = b->s[i] + 1.0;
+    /* -n.D, how far the surface faces the ray: root / R */
+    const double facing = sqrt(b->facing2[i] > 0.0 ? b->facing2[i] : 0.0);
+
+    /* normal [4 mul 2 add 1 div] */
+    const double inv_d2 = 1.0 / d_dot_d;
+    const double along = inv_d2 * (along_frame - facing);   /* t / R: n = (t x, t y, e (1 - t)) / R */
     const double n_x = b->x[i] * along;
-    const double n_y = r->y * along;
     const double share_1 = b->s[i] * depth.hi;
-    const double n_z = inv_d2 * (b->facing[i] + share_1);   /* a sum, where e (1 - t) would cancel */
+    const double n_z = inv_d2 * (facing + share_1);   /* a sum, where e (1 - t) would cancel */
 
-    /* light [4 mul 4 add] */
-    const double w_y = lamp_y - n_y;
+    /* light [1 add] */
     const double w_z = lamp_z - n_z;
-    const double w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
-    const double n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
 
-    /* specular [10 mul 4 add] */
-    const double bounce = 2.0 * b->facing[i];
+    /* specular [7 mul 3 add] */
+    const double bounce = 2.0 * facing;
     const double gap2 = b->s[i] * depth2.hi;   /* |m x D|^2 in radii = |D|^2 - facing^2, free of cancellation */
     const double turn = gap2 - b->facing2[i];   /* -|D|^2 cos 2a, a the angle of incidence */
     const double spread = turn + bounce * depth_focal.hi;
     /* the primary ray mirrored at the surface, times |D|^2: turn D + bounce F, F = kappa (f x, f y, s) */
     const double mirror_x = b->x[i] * spread;
-    const double mirror_y = r->y * spread;
     const double mirror_z = share_1 * bounce - turn;
-    const double w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
     const double inv_d4 = inv_d2 * inv_d2;
     const double inv_d6 = inv_d2 * inv_d4;   /* 1 / |mirror|^2 */
 
+    b->along[i] = along;
     b->n_x[i] = n_x;
-    b->w_y[i] = w_y;
+    b->n_z[i] = n_z;
     b->w_z[i] = w_z;
-    b->w2_even[i] = w2_even;
-    b->n_dot_l_even[i] = n_dot_l_even;
+    b->spread[i] = spread;
     b->mirror_x[i] = mirror_x;
-    b->mirror_y[i] = mirror_y;
     b->mirror_z[i] = mirror_z;
-    b->w_dot_mirror_even[i] = w_dot_mirror_even;
     b->inv_d6[i] = inv_d6;
 }
 
-/* Stage 3: light, diffuse [4 mul 3 add 1 div 1 sqrt 1 max]. Leaves w_x, w2, inv_w2, diffuse. */
-SYMRENDER_INLINE void stage_3(double side, block *b, int i)
+/* Stage 3, the same for x and -x: normal, light, specular [8 mul 4 add]. Leaves w_y, w2_even, n_dot_l_even,
+ * mirror_y, w_dot_mirror_even. */
+SYMRENDER_INLINE void stage_3(const row *r, block *b, int i)
+{
+    /* normal [1 mul] */
+    const double n_y = r->y * b->along[i];
+
+    /* light [4 mul 3 add] */
+    const double w_y = lamp_y - n_y;
+    const double w2_even = w_y * w_y + b->w_z[i] * b->w_z[i];   /* what x and -x share in w2 */
+    const double n_dot_l_even = n_y * w_y + b->n_z[i] * b->w_z[i];   /* what x and -x share in n_dot_l */
+
+    /* specular [3 mul 1 add] */
+    const double mirror_y = r->y * b->spread[i];
+    /* what x and -x share in w_dot_mirror */
+    const double w_dot_mirror_even = w_y * mirror_y + b->w_z[i] * b->mirror_z[i];
+
+    b->w_y[i] = w_y;
+    b->w2_even[i] = w2_even;
+    b->n_dot_l_even[i] = n_dot_l_even;
+    b->mirror_y[i] = mirror_y;
+    b->w_dot_mirror_even[i] = w_dot_mirror_even;
+}
+
+/* Stage 4: light, diffuse [4 mul 3 add 1 div 1 sqrt 1 max]. Leaves w_x, w2, inv_w2, diffuse. */
+SYMRENDER_INLINE void stage_4(double side, block *b, int i)
 {
     const double n_x = side * b->n_x[i];
 
@@ -214,8 +231,8 @@ SYMRENDER_INLINE void stage_3(double side, block *b, int i)
     b->diffuse[i] = diffuse;
 }
 
-/* Stage 4: specular, intensity [14 mul 11 add 3 select 4 call]. Leaves value. */
-SYMRENDER_INLINE void stage_4(double side, block *b, int i)
+/* Stage 5: specular, intensity [14 mul 11 add 3 select 4 call]. Leaves value. */
+SYMRENDER_INLINE void stage_5(double side, block *b, int i)
 {
     const double mirror_x = side * b->mirror_x[i];
 
@@ -251,9 +268,9 @@ SYMRENDER_INLINE void stage_4(double side, block *b, int i)
 SYMRENDER_INLINE void finish(double side, int count, const row *r, block *b)
 {
     for (int i = 0; i < count; ++i)
-        stage_3(side, b, i);
-    for (int i = 0; i < count; ++i)
         stage_4(side, b, i);
+    for (int i = 0; i < count; ++i)
+        stage_5(side, b, i);
     (void)r;
 }
 
@@ -262,23 +279,29 @@ static inline double at_most(double intensity, double white)
     return intensity > white ? white : intensity;
 }
 
-void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
-    int row_begin, int row_end)
+/* Rows [row_begin, row_end), and where `twins` is not 0 those at -y with them: what does not change with the sign of y
+ * is computed once for both. */
+static void draw_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
+    int row_begin, int row_end, int twins)
 {
+    if (row_begin >= row_end)
+        return;
     const double unit = plane_unit;
     const double pixel = grid->pixel, step = pixel * unit;
     const double left = 0.5 - 0.5 * grid->width, top = 0.5 * grid->height - 0.5;
     const double white = grid->white;
     const double background_here = at_most(background, white);
-    const int width = grid->width;
+    const int width = grid->width, height = grid->height;
     block b SYMRENDER_ALIGNED;
     row next = row_of((top - row_begin) * pixel * unit);
 
     for (int j = row_begin; j < row_end; ++j) {
-        double *restrict out = image + j * stride;
+        const int rows = twins && 2 * j + 1 != height ? 2 : 1;
+        double *const row_at[2] = {image + j * stride, image + (height - 1 - j) * stride};
         const double plane_y = (top - j) * pixel;
         const row r = next;
         next = row_of((top - (j + 1)) * pixel * unit);   /* begun here, it is ready when this row is done */
+        const row r_of[2] = {r, rows == 2 ? row_of(-plane_y * unit) : r};
 
         /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
          * closed form and settled by an exact test */
@@ -290,14 +313,20 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
 
         const int end = last >= width / 2 ? last + 1 : width;
         const int begin = last >= width / 2 ? width - end : width;
-        if (j + 1 < row_end)
-            fetch_ahead(out + stride, (size_t)width * sizeof *out);
+        if (j + 1 < row_end) {
+            fetch_ahead(row_at[0] + stride, (size_t)width * sizeof *image);
+            if (twins)
+                fetch_ahead(row_at[1] - stride, (size_t)width * sizeof *image);
+        }
         /* the background, in whole vectors: it may run into the hits, which are written over it */
         const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
-        for (int i = 0; i < before; ++i)
-            out[i] = background_here;
-        for (int i = vectors_begin(end); i < width; ++i)
-            out[i] = background_here;
+        for (int k = 0; k < rows; ++k) {
+            double *restrict out = row_at[k];
+            for (int i = 0; i < before; ++i)
+                out[i] = background_here;
+            for (int i = vectors_begin(end); i < width; ++i)
+                out[i] = background_here;
+        }
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
@@ -305,15 +334,38 @@ void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const sym
             for (int i = 0; i < vectors; ++i)
                 stage_1((at + i + left) * step, &r, &b, i);
             for (int i = 0; i < vectors; ++i)
-                stage_2(&r, &b, i);
-            finish(1.0, vectors, &r, &b);
-            for (int i = 0; i < count; ++i)
-                out[at + i] = at_most(b.value[i], white);
-            finish(-1.0, vectors, &r, &b);
-            for (int i = 0; i < count; ++i)
-                out[width - 1 - at - i] = at_most(b.value[i], white);
+                stage_2(&b, i);
+            for (int k = 0; k < rows; ++k) {
+                double *restrict out = row_at[k];
+                for (int i = 0; i < vectors; ++i)
+                    stage_3(&r_of[k], &b, i);
+                finish(1.0, vectors, &r_of[k], &b);
+                for (int i = 0; i < count; ++i)
+                    out[at + i] = at_most(b.value[i], white);
+                finish(-1.0, vectors, &r_of[k], &b);
+                for (int i = 0; i < count; ++i)
+                    out[width - 1 - at - i] = at_most(b.value[i], white);
+            }
         }
     }
+}
+
+void centred_sphere_double_baked_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
+    int row_begin, int row_end)
+{
+    /* rows [first, last) have their twins among them */
+    const int height = grid->height, first = row_begin > height - row_end ? row_begin : height - row_end;
+    const int last = height - first;
+
+    draw_rows(image, stride, grid, row_begin, first < last ? first : row_end, 0);
+    draw_rows(image, stride, grid, first, first < last ? height - height / 2 : first, 1);
+    draw_rows(image, stride, grid, first < last ? last : row_end, row_end, 0);
+}
+
+void centred_sphere_double_baked_row_pairs(double *image, ptrdiff_t stride, const symrender_grid *grid,
+    int row_begin, int row_end)
+{
+    draw_rows(image, stride, grid, row_begin, row_end, 1);
 }
 
 void centred_sphere_double_baked_points(double *values, const double *x, const double *y,
@@ -333,14 +385,16 @@ void centred_sphere_double_baked_points(double *values, const double *x, const d
             facing[i] = sight(block_x[i] * unit, &r, &doubt[i]);
             stage_1(block_x[i] * unit, &r, &b, i);
         }
+        for (int i = 0; i < length; ++i)
+            stage_2(&b, i);
         for (int i = 0; i < length; ++i) {
             const row r = row_of(block_y[i] * unit);
-            stage_2(&r, &b, i);
+            stage_3(&r, &b, i);
         }
         for (int i = 0; i < length; ++i)
-            stage_3(1.0, &b, i);
-        for (int i = 0; i < length; ++i)
             stage_4(1.0, &b, i);
+        for (int i = 0; i < length; ++i)
+            stage_5(1.0, &b, i);
         for (int i = 0; i < length; ++i)
             out[i] = at_most(facing[i] > 0.0 ? b.value[i] : background_here, white);
         for (int i = 0; i < length; ++i)

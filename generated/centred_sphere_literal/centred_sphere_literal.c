@@ -24,7 +24,7 @@
 
 /* What does not change within a frame. */
 typedef struct {
-    double disc_frame, disc_frame_1, d_dot_d_frame, m_dot_d, n_x_frame, eye, light_x, light_y, light_z, light_intensity,
+    double disc_frame, disc_frame_1, eye2, m_dot_d, n_x_frame, eye, light_x, light_y, light_z, light_intensity,
         k_ambient, k_diffuse, k_specular, shininess;
 } frame;
 
@@ -35,7 +35,7 @@ static frame frame_of(const centred_sphere_literal_scene *scene)
     const double share_2 = scene->radius * scene->radius;
     const double disc_frame = share_1 * share_2;   /* what is the same for a frame in disc */
     const double disc_frame_1 = share_2 - share_1;   /* what is the same for a frame in disc */
-    const double d_dot_d_frame = share_1;   /* what is the same for a frame in d_dot_d */
+    const double eye2 = share_1;
     const double m_dot_d = share_1;   /* positive where the sphere lies before the eye */
 
     /* hit point and normal [1 div] */
@@ -44,7 +44,7 @@ static frame frame_of(const centred_sphere_literal_scene *scene)
     const frame f = {
         .disc_frame = disc_frame,
         .disc_frame_1 = disc_frame_1,
-        .d_dot_d_frame = d_dot_d_frame,
+        .eye2 = eye2,
         .m_dot_d = m_dot_d,
         .n_x_frame = n_x_frame,
         .eye = scene->eye,
@@ -62,17 +62,17 @@ static frame frame_of(const centred_sphere_literal_scene *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double y, disc_row;
+    double y, y2;
 } row;
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
 {
     /* ray and sphere [1 mul] */
-    const double disc_row = y * y;   /* what is the same for a row in disc */
+    const double y2 = y * y;
     (void)f;
 
     const row r = {
-        .y = y, .disc_row = disc_row,
+        .y = y, .y2 = y2,
     };
     return r;
 }
@@ -81,10 +81,10 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
 SYMRENDER_INLINE double shade(double x, const row *r, const frame *f, double background)
 {
     /* ray and sphere [2 mul 3 add 1 sqrt 1 max] */
-    const double share_3 = x * x + r->disc_row;
+    const double share_3 = x * x + r->y2;
     /* disc = e^2 R^2 - (e^2 - R^2)(x^2 + y^2): a hit where >= 0 */
     const double disc = f->disc_frame + f->disc_frame_1 * share_3;
-    const double d_dot_d = share_3 + f->d_dot_d_frame;   /* D = (x, y, -e), A = |D|^2 */
+    const double d_dot_d = share_3 + f->eye2;   /* D = (x, y, -e), A = |D|^2 */
     const double root = sqrt(disc > 0.0 ? disc : 0.0);
 
     /* hit point and normal [6 mul 2 add 1 div] */

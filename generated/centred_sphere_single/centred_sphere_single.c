@@ -15,7 +15,8 @@
  * ops      once: frame 4 mul 3 div 1 select 21 call
  *          a row: 1 mul 5 call
  *          a pixel: 38 mul 27 add 2 div 2 sqrt 2 max 2 select 2 call
- *          of these, once for two of them, at x and -x: 24 mul 13 add 1 div 1 sqrt 1 max
+ *          of these, once for four of them, at x and -x, y and -y: 12 mul 7 add 1 div 1 sqrt 1 max
+ *          and once for two, at x and -x: 12 mul 6 add
  */
 #include "centred_sphere_single.h"
 
@@ -34,7 +35,7 @@ enum { POINTS = 256 };   /* pixels of a block: its arrays fit into the first lev
 typedef struct {
     int half_exponent;
     float shininess_single, zero_power_single, lamp_x_single, lamp_y_single, lamp_z_single, alpha_single, focal_single,
-        d_dot_d_frame, depth_single, along_frame, diffuse_gain, specular_gain, k_ambient_single;
+        focal2, depth_single, along_frame, diffuse_gain, specular_gain, k_ambient_single;
     double plane_unit;
     double_double rho2;
 } frame;
@@ -83,7 +84,7 @@ static frame frame_of(const centred_sphere_single_scene *scene)
     /* ray and sphere [1 mul] */
     const float alpha_single = (float)alpha.hi;
     const float focal_single = (float)focal;
-    const float d_dot_d_frame = focal_single * focal_single;   /* what is the same for a frame in d_dot_d */
+    const float focal2 = focal_single * focal_single;
 
     /* normal [1 mul] */
     const float depth_single = (float)depth.hi;
@@ -111,7 +112,7 @@ static frame frame_of(const centred_sphere_single_scene *scene)
         .rho2 = rho2,
         .alpha_single = alpha_single,
         .focal_single = focal_single,
-        .d_dot_d_frame = d_dot_d_frame,
+        .focal2 = focal2,
         .depth_single = depth_single,
         .along_frame = along_frame,
         .diffuse_gain = diffuse_gain,
@@ -124,7 +125,7 @@ static frame frame_of(const centred_sphere_single_scene *scene)
 /* What does not change within a row. */
 typedef struct {
     double_double x_left, x_right;
-    float y_single, s_row;
+    float y_single, y2;
 } row;
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
@@ -137,10 +138,10 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
 
     /* ray and sphere [1 mul] */
     const float y_single = (float)y;
-    const float s_row = y_single * y_single;   /* what is the same for a row in s */
+    const float y2 = y_single * y_single;
 
     const row r = {
-        .x_left = x_left, .x_right = x_right, .y_single = y_single, .s_row = s_row,
+        .x_left = x_left, .x_right = x_right, .y_single = y_single, .y2 = y2,
     };
     return r;
 }
@@ -178,8 +179,8 @@ SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *su
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const float facing2 = f->alpha_single * chord;
     const float x_single = (float)x;
-    const float s = x_single * x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    const float d_dot_d = s + f->d_dot_d_frame;
+    const float s = x_single * x_single + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const float d_dot_d = s + f->focal2;
 
     *sure = certainty(facing2, d_dot_d);
     return facing2;
@@ -254,71 +255,77 @@ SYMRENDER_INLINE place place_in(const row_hits *h, int i)
 
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
-    float x_single[POINTS], s[POINTS], facing[POINTS], inv_d2[POINTS], n_x[POINTS], w2_even[POINTS],
-        n_dot_l_even[POINTS], mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS], w_dot_mirror_even[POINTS],
-        side_y_odd[POINTS], side_z_odd[POINTS], sin2_even[POINTS], w2[POINTS], diffuse[POINTS], w_dot_mirror[POINTS],
-        cos2[POINTS], sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
+    float inv_d2[POINTS], along[POINTS], n_x[POINTS], n_z[POINTS], w_z[POINTS], bounce[POINTS], mirror_x[POINTS],
+        mirror_z[POINTS], side_y_odd[POINTS], w2_even[POINTS], n_dot_l_even[POINTS], mirror_y[POINTS],
+        w_dot_mirror_even[POINTS], side_z_odd[POINTS], sin2_even[POINTS], w2[POINTS], diffuse[POINTS],
+        w_dot_mirror[POINTS], cos2[POINTS], sin2[POINTS], highlight_log2[POINTS], highlight[POINTS], value[POINTS];
 } block;
 
-/* Stage 1, the same for x and -x: ray and sphere, normal [3 mul 2 add 1 div 1 sqrt 1 max]. Leaves x_single, s,
- * facing, inv_d2. */
+/* Stage 1, the same for x and -x, y and -y: ray and sphere, normal, light, specular [12 mul 7 add 1 div 1 sqrt 1
+ * max]. Leaves inv_d2, along, n_x, n_z, w_z, bounce, mirror_x, mirror_z, side_y_odd. */
 SYMRENDER_INLINE void stage_1(place p, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [3 mul 2 add 1 sqrt 1 max] */
     const float chord = p.from_left_single * p.to_right_single;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const float facing2 = f->alpha_single * chord;
-    const float s = p.x_single * p.x_single + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    const float d_dot_d = s + f->d_dot_d_frame;
+    const float s = p.x_single * p.x_single + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const float d_dot_d = s + f->focal2;
     /* -n.D, how far the surface faces the ray: root / R */
     const float facing = sqrtf(facing2 > 0.0f ? facing2 : 0.0f);
 
-    /* normal [1 div] */
+    /* normal [5 mul 2 add 1 div] */
     const float inv_d2 = 1.0f / d_dot_d;
+    const float along = inv_d2 * (f->along_frame - facing);   /* t / R: n = (t x, t y, e (1 - t)) / R */
+    const float n_x = p.x_single * along;
+    /* a sum, where e (1 - t) would cancel */
+    const float n_z = (s * f->depth_single + f->focal_single * facing) * inv_d2;
 
-    b->x_single[i] = p.x_single;
-    b->s[i] = s;
-    b->facing[i] = facing;
+    /* light [1 add] */
+    const float w_z = f->lamp_z_single - n_z;
+
+    /* specular [4 mul 2 add] */
+    const float bounce = 2.0f * facing;
+    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
+    const float mirror_x = p.x_single + n_x * bounce;
+    const float mirror_z = n_z * bounce - f->focal_single;
+    const float side_y_odd = w_z * mirror_x;   /* what x and -x share up to the sign in side_y */
+
     b->inv_d2[i] = inv_d2;
+    b->along[i] = along;
+    b->n_x[i] = n_x;
+    b->n_z[i] = n_z;
+    b->w_z[i] = w_z;
+    b->bounce[i] = bounce;
+    b->mirror_x[i] = mirror_x;
+    b->mirror_z[i] = mirror_z;
+    b->side_y_odd[i] = side_y_odd;
 }
 
-/* Stage 2, the same for x and -x: normal, light, specular [21 mul 11 add]. Leaves n_x, w2_even, n_dot_l_even,
- * mirror_x, mirror_y, mirror_z, w_dot_mirror_even, side_y_odd, side_z_odd, sin2_even. */
+/* Stage 2, the same for x and -x: normal, light, specular [12 mul 6 add]. Leaves w2_even, n_dot_l_even, mirror_y,
+ * w_dot_mirror_even, side_z_odd, sin2_even. */
 SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
 {
-    /* normal [6 mul 2 add] */
-    const float along = b->inv_d2[i] * (f->along_frame - b->facing[i]);   /* t / R: n = (t x, t y, e (1 - t)) / R */
-    const float n_x = b->x_single[i] * along;
-    const float n_y = r->y_single * along;
-    /* a sum, where e (1 - t) would cancel */
-    const float n_z = (b->s[i] * f->depth_single + f->focal_single * b->facing[i]) * b->inv_d2[i];
+    /* normal [1 mul] */
+    const float n_y = r->y_single * b->along[i];
 
-    /* light [4 mul 4 add] */
+    /* light [4 mul 3 add] */
     const float w_y = f->lamp_y_single - n_y;
-    const float w_z = f->lamp_z_single - n_z;
-    const float w2_even = w_y * w_y + w_z * w_z;   /* what x and -x share in w2 */
-    const float n_dot_l_even = n_y * w_y + n_z * w_z;   /* what x and -x share in n_dot_l */
+    const float w2_even = w_y * w_y + b->w_z[i] * b->w_z[i];   /* what x and -x share in w2 */
+    const float n_dot_l_even = n_y * w_y + b->n_z[i] * b->w_z[i];   /* what x and -x share in n_dot_l */
 
-    /* specular [11 mul 5 add] */
-    const float bounce = 2.0f * b->facing[i];
-    /* the primary ray mirrored at the surface, D + 2 facing n, as long as D */
-    const float mirror_x = b->x_single[i] + n_x * bounce;
-    const float mirror_y = r->y_single + n_y * bounce;
-    const float mirror_z = n_z * bounce - f->focal_single;
-    const float w_dot_mirror_even = w_y * mirror_y + w_z * mirror_z;   /* what x and -x share in w_dot_mirror */
-    const float side_x = w_y * mirror_z - w_z * mirror_y;   /* w x mirror, short where the highlight is */
-    const float side_y_odd = w_z * mirror_x;   /* what x and -x share up to the sign in side_y */
-    const float side_z_odd = -(w_y * mirror_x);   /* what x and -x share up to the sign in side_z */
+    /* specular [7 mul 3 add] */
+    const float mirror_y = r->y_single + n_y * b->bounce[i];
+    /* what x and -x share in w_dot_mirror */
+    const float w_dot_mirror_even = w_y * mirror_y + b->w_z[i] * b->mirror_z[i];
+    const float side_x = w_y * b->mirror_z[i] - b->w_z[i] * mirror_y;   /* w x mirror, short where the highlight is */
+    const float side_z_odd = -(w_y * b->mirror_x[i]);   /* what x and -x share up to the sign in side_z */
     const float sin2_even = side_x * side_x;   /* what x and -x share in sin2 */
 
-    b->n_x[i] = n_x;
     b->w2_even[i] = w2_even;
     b->n_dot_l_even[i] = n_dot_l_even;
-    b->mirror_x[i] = mirror_x;
     b->mirror_y[i] = mirror_y;
-    b->mirror_z[i] = mirror_z;
     b->w_dot_mirror_even[i] = w_dot_mirror_even;
-    b->side_y_odd[i] = side_y_odd;
     b->side_z_odd[i] = side_z_odd;
     b->sin2_even[i] = sin2_even;
 }
@@ -415,24 +422,30 @@ static inline float at_most(float intensity, float white)
     return intensity > white ? white : intensity;
 }
 
-void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_grid *grid,
-    const centred_sphere_single_scene *scene, int row_begin, int row_end)
+/* Rows [row_begin, row_end), and where `twins` is not 0 those at -y with them: what does not change with the sign of y
+ * is computed once for both. */
+static void draw_rows(float *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_single_scene *scene, int row_begin, int row_end, int twins)
 {
+    if (row_begin >= row_end)
+        return;
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;
     const double pixel = grid->pixel, step = pixel * unit;
     const double left = 0.5 - 0.5 * grid->width, top = 0.5 * grid->height - 0.5;
     const float white = (float)grid->white;
     const float background = at_most((float)scene->background, white);
-    const int width = grid->width;
+    const int width = grid->width, height = grid->height;
     block b SYMRENDER_ALIGNED;
     row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
-        float *restrict out = image + j * stride;
+        const int rows = twins && 2 * j + 1 != height ? 2 : 1;
+        float *const row_at[2] = {image + j * stride, image + (height - 1 - j) * stride};
         const double plane_y = (top - j) * pixel;
         const row r = next;
         next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
+        const row r_of[2] = {r, rows == 2 ? row_of(-plane_y * unit, &f) : r};
 
         /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
          * closed form and settled by an exact test */
@@ -444,14 +457,20 @@ void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_
 
         const int end = last >= width / 2 ? last + 1 : width;
         const int begin = last >= width / 2 ? width - end : width;
-        if (j + 1 < row_end)
-            fetch_ahead(out + stride, (size_t)width * sizeof *out);
+        if (j + 1 < row_end) {
+            fetch_ahead(row_at[0] + stride, (size_t)width * sizeof *image);
+            if (twins)
+                fetch_ahead(row_at[1] - stride, (size_t)width * sizeof *image);
+        }
         /* the background, in whole vectors: it may run into the hits, which are written over it */
         const int before = whole_vectors(begin) < width ? whole_vectors(begin) : width;
-        for (int i = 0; i < before; ++i)
-            out[i] = background;
-        for (int i = vectors_begin(end); i < width; ++i)
-            out[i] = background;
+        for (int k = 0; k < rows; ++k) {
+            float *restrict out = row_at[k];
+            for (int i = 0; i < before; ++i)
+                out[i] = background;
+            for (int i = vectors_begin(end); i < width; ++i)
+                out[i] = background;
+        }
         const row_hits h = hits_between(begin, end, left, step, &r, &f);
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
@@ -459,16 +478,37 @@ void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_
             const int vectors = whole_vectors(count);
             for (int i = 0; i < vectors; ++i)
                 stage_1(place_in(&h, at + i), &r, &f, &b, i);
-            for (int i = 0; i < vectors; ++i)
-                stage_2(&r, &f, &b, i);
-            finish(1.0f, vectors, &r, &f, &b);
-            for (int i = 0; i < count; ++i)
-                out[at + i] = at_most(b.value[i], white);
-            finish(-1.0f, vectors, &r, &f, &b);
-            for (int i = 0; i < count; ++i)
-                out[width - 1 - at - i] = at_most(b.value[i], white);
+            for (int k = 0; k < rows; ++k) {
+                float *restrict out = row_at[k];
+                for (int i = 0; i < vectors; ++i)
+                    stage_2(&r_of[k], &f, &b, i);
+                finish(1.0f, vectors, &r_of[k], &f, &b);
+                for (int i = 0; i < count; ++i)
+                    out[at + i] = at_most(b.value[i], white);
+                finish(-1.0f, vectors, &r_of[k], &f, &b);
+                for (int i = 0; i < count; ++i)
+                    out[width - 1 - at - i] = at_most(b.value[i], white);
+            }
         }
     }
+}
+
+void centred_sphere_single_rows(float *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_single_scene *scene, int row_begin, int row_end)
+{
+    /* rows [first, last) have their twins among them */
+    const int height = grid->height, first = row_begin > height - row_end ? row_begin : height - row_end;
+    const int last = height - first;
+
+    draw_rows(image, stride, grid, scene, row_begin, first < last ? first : row_end, 0);
+    draw_rows(image, stride, grid, scene, first, first < last ? height - height / 2 : first, 1);
+    draw_rows(image, stride, grid, scene, first < last ? last : row_end, row_end, 0);
+}
+
+void centred_sphere_single_row_pairs(float *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_single_scene *scene, int row_begin, int row_end)
+{
+    draw_rows(image, stride, grid, scene, row_begin, row_end, 1);
 }
 
 void centred_sphere_single_points(float *values, const double *x, const double *y,

@@ -37,7 +37,7 @@ enum { POINTS = 128 };   /* pixels of a block: its arrays fit into the first lev
 typedef struct {
     int half_exponent;
     double zero_power, plane_unit, extent_x, extent_y, k_ambient, shininess;
-    double_double specular_gain, lamp_x, lamp_y, lamp2, alpha, rho2, d_dot_d_frame, slope, bend, base_frame,
+    double_double specular_gain, lamp_x, lamp_y, lamp2, alpha, rho2, focal2, slope, bend, base_frame,
         row_dot_lamp_frame, diffuse_gain;
 } frame;
 
@@ -84,7 +84,7 @@ static frame frame_of(const centred_sphere_stable_scene *scene)
     const double extent_y = share_1;
 
     /* ray and sphere [1 call] */
-    const double_double d_dot_d_frame = dd_product(focal, focal);   /* what is the same for a frame in d_dot_d */
+    const double_double focal2 = dd_product(focal, focal);
 
     /* normal [5 call] */
     /* F = kappa (f x, f y, s): F.lamp = slope x + bend s + base */
@@ -112,7 +112,7 @@ static frame frame_of(const centred_sphere_stable_scene *scene)
         .rho2 = rho2,
         .extent_x = extent_x,
         .extent_y = extent_y,
-        .d_dot_d_frame = d_dot_d_frame,
+        .focal2 = focal2,
         .slope = slope,
         .bend = bend,
         .base_frame = base_frame,
@@ -126,7 +126,7 @@ static frame frame_of(const centred_sphere_stable_scene *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double_double x_left, x_right, s_row, base, row_dot_lamp;
+    double_double x_left, x_right, y2, base, row_dot_lamp;
 } row;
 
 SYMRENDER_INLINE row row_of(double y, const frame *f)
@@ -138,7 +138,7 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const double_double x_right = reach;
 
     /* ray and sphere [1 call] */
-    const double_double s_row = dd_product(y, y);   /* what is the same for a row in s */
+    const double_double y2 = dd_product(y, y);
 
     /* normal [1 call] */
     const double_double base = dd_mul_double(f->base_frame, y);
@@ -147,7 +147,7 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const double_double row_dot_lamp = dd_add(dd_mul_double(f->lamp_y, y), f->row_dot_lamp_frame);
 
     const row r = {
-        .x_left = x_left, .x_right = x_right, .s_row = s_row, .base = base, .row_dot_lamp = row_dot_lamp,
+        .x_left = x_left, .x_right = x_right, .y2 = y2, .base = base, .row_dot_lamp = row_dot_lamp,
     };
     return r;
 }
@@ -182,8 +182,8 @@ SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *su
     const double_double chord = pair_mul(from_left, to_right);
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double_double facing2 = pair_mul(f->alpha, chord);
-    const double_double s = pair_add(dd_product(x, x), r->s_row);   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    const double_double d_dot_d = pair_add(s, f->d_dot_d_frame);
+    const double_double s = pair_add(dd_product(x, x), r->y2);   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double_double d_dot_d = pair_add(s, f->focal2);
 
     *sure = certainty(facing2.hi, d_dot_d.hi);
     return facing2.hi;
@@ -268,10 +268,10 @@ static bounds bounds_of(
     const range from_left = range_within(range_sum(DOUBLE_DOUBLE, range_neg(x_left), x), 0.0, INFINITY);
     const range to_right = range_within(range_sum(DOUBLE_DOUBLE, x_right, range_neg(x)), 0.0, INFINITY);
     const range chord = range_product(PAIR, from_left, to_right);
-    const range s_row = range_square(DOUBLE_DOUBLE, y);
-    const range s = range_sum(PAIR, range_square(DOUBLE_DOUBLE, x), s_row);
-    const range d_dot_d_frame = range_square(DOUBLE_DOUBLE, range_exact(focal));
-    const range d_dot_d = range_sum(PAIR, s, d_dot_d_frame);
+    const range y2 = range_square(DOUBLE_DOUBLE, y);
+    const range s = range_sum(PAIR, range_square(DOUBLE_DOUBLE, x), y2);
+    const range focal2 = range_square(DOUBLE_DOUBLE, range_exact(focal));
+    const range d_dot_d = range_sum(PAIR, s, focal2);
     const double farthest2 = range_size(d_dot_d);   /* the largest |D|^2 */
     const range facing2 = range_within(range_product(PAIR, alpha, chord), SURE_HIT, farthest2);
     const range facing = range_root(PAIR, range_positive_part(facing2));
@@ -358,17 +358,17 @@ SYMRENDER_INLINE int surely_misses(double facing2, double d_dot_d)
 
 /* Values of a block of pixels, from the stages that compute them to those that use them. */
 typedef struct {
-    double facing[POINTS], facing_lo[POINTS], inv_d2[POINTS], inv_d2_lo[POINTS], foot_dot_lamp_even[POINTS],
-        foot_dot_lamp_even_lo[POINTS], foot_dot_lamp_odd[POINTS], foot_dot_lamp_odd_lo[POINTS], d_dot_lamp_odd[POINTS],
-        d_dot_lamp_odd_lo[POINTS], facing2[POINTS], d_dot_d[POINTS], w2[POINTS], w2_lo[POINTS], diffuse[POINTS],
-        diffuse_lo[POINTS], w_dot_mirror[POINTS], w_dot_mirror_lo[POINTS], cos2[POINTS], cos2_lo[POINTS],
-        n_dot_l[POINTS], sin2[POINTS], sin2_lo[POINTS], highlight[POINTS], highlight_lo[POINTS], value[POINTS],
-        value_lo[POINTS];
+    double s[POINTS], s_lo[POINTS], facing[POINTS], facing_lo[POINTS], inv_d2[POINTS], inv_d2_lo[POINTS],
+        foot_dot_lamp_odd[POINTS], foot_dot_lamp_odd_lo[POINTS], d_dot_lamp_odd[POINTS], d_dot_lamp_odd_lo[POINTS],
+        facing2[POINTS], d_dot_d[POINTS], foot_dot_lamp_even[POINTS], foot_dot_lamp_even_lo[POINTS], w2[POINTS],
+        w2_lo[POINTS], diffuse[POINTS], diffuse_lo[POINTS], w_dot_mirror[POINTS], w_dot_mirror_lo[POINTS], cos2[POINTS],
+        cos2_lo[POINTS], n_dot_l[POINTS], sin2[POINTS], sin2_lo[POINTS], highlight[POINTS], highlight_lo[POINTS],
+        value[POINTS], value_lo[POINTS];
     double error[POINTS];   /* a bound of that of the value: 0 where it is exact, INFINITY for an unknown one */
 } block;
 
-/* Stage 1, the same for x and -x: ray and sphere, normal, light [15 call]. Leaves facing, inv_d2,
- * foot_dot_lamp_even, foot_dot_lamp_odd, d_dot_lamp_odd, facing2, d_dot_d. */
+/* Stage 1, the same for x and -x, y and -y: ray and sphere, normal, light [13 call]. Leaves s, facing, inv_d2,
+ * foot_dot_lamp_odd, d_dot_lamp_odd, facing2, d_dot_d. */
 SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, int i)
 {
     /* ray and sphere [10 call] */
@@ -378,15 +378,13 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, 
     const double_double chord = pair_mul(from_left, to_right);
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double_double facing2 = pair_mul(f->alpha, chord);
-    const double_double s = pair_add(dd_product(x, x), r->s_row);   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
-    const double_double d_dot_d = pair_add(s, f->d_dot_d_frame);
+    const double_double s = pair_add(dd_product(x, x), r->y2);   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double_double d_dot_d = pair_add(s, f->focal2);
     /* -n.D, how far the surface faces the ray: root / R */
     const double_double facing = pair_sqrt(pair_positive_part(facing2));
 
-    /* normal [4 call] */
+    /* normal [2 call] */
     const double_double inv_d2 = pair_inverse(d_dot_d);
-    /* what x and -x share in foot_dot_lamp */
-    const double_double foot_dot_lamp_even = pair_add(pair_mul(s, f->bend), r->base);
     /* what x and -x share up to the sign in foot_dot_lamp */
     const double_double foot_dot_lamp_odd = pair_mul_double(f->slope, x);
 
@@ -394,12 +392,12 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, 
     /* what x and -x share up to the sign in d_dot_lamp */
     const double_double d_dot_lamp_odd = pair_mul_double(f->lamp_x, x);
 
+    b->s[i] = s.hi;
+    b->s_lo[i] = s.lo;
     b->facing[i] = facing.hi;
     b->facing_lo[i] = facing.lo;
     b->inv_d2[i] = inv_d2.hi;
     b->inv_d2_lo[i] = inv_d2.lo;
-    b->foot_dot_lamp_even[i] = foot_dot_lamp_even.hi;
-    b->foot_dot_lamp_even_lo[i] = foot_dot_lamp_even.lo;
     b->foot_dot_lamp_odd[i] = foot_dot_lamp_odd.hi;
     b->foot_dot_lamp_odd_lo[i] = foot_dot_lamp_odd.lo;
     b->d_dot_lamp_odd[i] = d_dot_lamp_odd.hi;
@@ -408,8 +406,21 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, 
     b->d_dot_d[i] = d_dot_d.hi;
 }
 
-/* Stage 2: normal, light, diffuse, specular [20 call]. Leaves w2, diffuse, w_dot_mirror, cos2, n_dot_l. */
-SYMRENDER_INLINE void stage_2(double side, const row *r, const frame *f, block *b, int i)
+/* Stage 2, the same for x and -x: normal [2 call]. Leaves foot_dot_lamp_even. */
+SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
+{
+    const double_double s = {b->s[i], b->s_lo[i]};
+
+    /* normal [2 call] */
+    /* what x and -x share in foot_dot_lamp */
+    const double_double foot_dot_lamp_even = pair_add(pair_mul(s, f->bend), r->base);
+
+    b->foot_dot_lamp_even[i] = foot_dot_lamp_even.hi;
+    b->foot_dot_lamp_even_lo[i] = foot_dot_lamp_even.lo;
+}
+
+/* Stage 3: normal, light, diffuse, specular [20 call]. Leaves w2, diffuse, w_dot_mirror, cos2, n_dot_l. */
+SYMRENDER_INLINE void stage_3(double side, const row *r, const frame *f, block *b, int i)
 {
     const double_double foot_dot_lamp_odd = {side * b->foot_dot_lamp_odd[i], side * b->foot_dot_lamp_odd_lo[i]};
     const double_double d_dot_lamp_odd = {side * b->d_dot_lamp_odd[i], side * b->d_dot_lamp_odd_lo[i]};
@@ -450,8 +461,8 @@ SYMRENDER_INLINE void stage_2(double side, const row *r, const frame *f, block *
     b->n_dot_l[i] = n_dot_l.hi;
 }
 
-/* Stage 3: specular [2 call]. Leaves sin2. */
-SYMRENDER_INLINE void stage_3(block *b, int i)
+/* Stage 4: specular [2 call]. Leaves sin2. */
+SYMRENDER_INLINE void stage_4(block *b, int i)
 {
     const double_double cos2 = {b->cos2[i], b->cos2_lo[i]};
 
@@ -463,8 +474,8 @@ SYMRENDER_INLINE void stage_3(block *b, int i)
     b->sin2_lo[i] = sin2.lo;
 }
 
-/* Stage 4: specular [3 call]. Leaves highlight. */
-SYMRENDER_INLINE void stage_4(const frame *f, block *b, int i)
+/* Stage 5: specular [3 call]. Leaves highlight. */
+SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
 {
     const double_double cos2 = {b->cos2[i], b->cos2_lo[i]};
     const double_double sin2 = {b->sin2[i], b->sin2_lo[i]};
@@ -477,8 +488,8 @@ SYMRENDER_INLINE void stage_4(const frame *f, block *b, int i)
     b->highlight_lo[i] = highlight.lo;
 }
 
-/* Stage 5: specular, intensity [2 add 7 call]. Leaves value. */
-SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
+/* Stage 6: specular, intensity [2 add 7 call]. Leaves value. */
+SYMRENDER_INLINE void stage_6(const frame *f, block *b, int i)
 {
     const double_double w2 = {b->w2[i], b->w2_lo[i]};
     const double_double diffuse = {b->diffuse[i], b->diffuse_lo[i]};
@@ -503,17 +514,17 @@ SYMRENDER_INLINE void stage_5(const frame *f, block *b, int i)
 SYMRENDER_INLINE void finish(double side, int count, const row *r, const frame *f, block *b)
 {
     for (int i = 0; i < count; ++i)
-        stage_2(side, r, f, b, i);
+        stage_3(side, r, f, b, i);
     if (f->half_exponent > 0) {
         whole_powers_of_pair(b->cos2, b->cos2_lo, b->highlight, b->highlight_lo, f->half_exponent, count);
     } else {
         for (int i = 0; i < count; ++i)
-            stage_3(b, i);
+            stage_4(b, i);
         for (int i = 0; i < count; ++i)
-            stage_4(f, b, i);
+            stage_5(f, b, i);
     }
     for (int i = 0; i < count; ++i)
-        stage_5(f, b, i);
+        stage_6(f, b, i);
 }
 
 /* Bounds of the errors of a block of values. */
@@ -523,21 +534,35 @@ SYMRENDER_INLINE void judge(block *b, int count, const bounds *limits)
         b->error[i] = error_of(b->facing2[i], b->d_dot_d[i], b->n_dot_l[i], b->w_dot_mirror[i], limits);
 }
 
+/* Where a ray surely misses, the value is the background's, exactly. */
+SYMRENDER_INLINE void clear_misses(block *b, int count, double background)
+{
+    for (int i = 0; i < count; ++i) {
+        const int is_miss = surely_misses(b->facing2[i], b->d_dot_d[i]);
+        b->value[i] = is_miss ? background : b->value[i];
+        b->value_lo[i] = is_miss ? 0.0 : b->value_lo[i];
+        b->error[i] = is_miss ? 0.0 : b->error[i];
+    }
+}
+
 /* Writes values within 4 ulp of the true ones, as far as the bounds show them to be that, and
  * the numbers of the points where they do not, from `first` on or back. Returns how many those are. `forth` is 1 or -1:
- * value k goes to out[k forth]; the first `passed` values are passed over. */
-SYMRENDER_INLINE ptrdiff_t settle(const block *b, int passed, int count, double *restrict out, int forth,
-    double white, ptrdiff_t first, ptrdiff_t *unsettled)
+ * value k goes to out[k forth], for passed <= k < count; the block holds `held` values, whole vectors of them where it
+ * may. */
+SYMRENDER_INLINE ptrdiff_t settle(const block *b, int held, int passed, int count,
+    double *restrict out, int forth, double white, ptrdiff_t first, ptrdiff_t *unsettled)
 {
     int settled[POINTS], some = 0;
-    for (int i = passed; i < count; ++i) {
+    double value[POINTS];
+    for (int i = 0; i < held; ++i) {
         const double_double v = dd_sum(b->value[i], b->value_lo[i]);
-        const int is_settled = is_within_four_ulp(
-            v, b->error[i]);
-        out[forth * i] = v.hi > white ? white : v.hi;
-        settled[i] = is_settled;
-        some += !is_settled;
+        const int is_settled = is_within_four_ulp(v, b->error[i]);
+        value[i] = v.hi > white ? white : v.hi;
+        settled[i] = is_settled | (i < passed) | (i >= count);
+        some += !settled[i];
     }
+    for (int i = passed; i < count; ++i)
+        out[forth * i] = value[i];
     if (some == 0)
         return 0;
     ptrdiff_t listed = 0;
@@ -555,16 +580,19 @@ double centred_sphere_stable_bound(
     return bounds_within(scene, &f, half * grid->width, half * grid->height).value;
 }
 
-ptrdiff_t centred_sphere_stable_rows(
-    double *image, ptrdiff_t stride, const symrender_grid *grid,
+/* Rows [row_begin, row_end), and where `twins` is not 0 those at -y with them: what does not change with the sign of y
+ * is computed once for both. */
+static ptrdiff_t settle_rows(double *image, ptrdiff_t stride, const symrender_grid *grid,
     const centred_sphere_stable_scene *scene,
-    int row_begin, int row_end, ptrdiff_t *unsettled)
+    int row_begin, int row_end, int twins, ptrdiff_t *unsettled)
 {
+    if (row_begin >= row_end)
+        return 0;
     const frame f = frame_of(scene);
     const double unit = f.plane_unit;
     const double pixel = grid->pixel, step = pixel * unit;
     const double left = 0.5 - 0.5 * grid->width, top = 0.5 * grid->height - 0.5;
-    const int width = grid->width;
+    const int width = grid->width, height = grid->height;
     const bounds b = bounds_within(scene, &f, 0.5 * width * step, 0.5 * grid->height * step);
     const double background = (double)(scene->background > grid->white ? grid->white : scene->background);
     ptrdiff_t found = 0;
@@ -572,10 +600,11 @@ ptrdiff_t centred_sphere_stable_rows(
     row next = row_of((top - row_begin) * pixel * unit, &f);
 
     for (int j = row_begin; j < row_end; ++j) {
-        double *restrict out = image + j * stride;
+        const int rows = twins && 2 * j + 1 != height ? 2 : 1, row_number[2] = {j, height - 1 - j};
         const double plane_y = (top - j) * pixel;
         const row r = next;
         next = row_of((top - (j + 1)) * pixel * unit, &f);   /* begun here, it is ready when this row is done */
+        const row r_of[2] = {r, rows == 2 ? row_of(-plane_y * unit, &f) : r};
 
         /* the hits of a row are one span of pixels, as many left of its middle as right of it; the right end is in
          * closed form and settled by an exact test */
@@ -587,8 +616,13 @@ ptrdiff_t centred_sphere_stable_rows(
 
         const int end = last >= width / 2 ? last + 1 : width;
         const int begin = last >= width / 2 ? width - end : width;
-        for (int i = 0; i < begin; ++i)
-            out[i] = background;
+        for (int k = 0; k < rows; ++k) {
+            double *restrict out = image + row_number[k] * stride;
+            for (int i = 0; i < begin; ++i)
+                out[i] = background;
+            for (int i = end; i < width; ++i)
+                out[i] = background;
+        }
         /* the right half of the span, and pixel by pixel its mirror image */
         for (int at = begin < end ? width / 2 : end, count; at < end; at += count) {
             count = end - at < POINTS ? end - at : POINTS;
@@ -597,16 +631,94 @@ ptrdiff_t centred_sphere_stable_rows(
             const int mirrored = width - 1 - at;
             for (int i = 0; i < vectors; ++i)
                 stage_1((at + i + left) * step, &r, &f, &values, i);
+            for (int k = 0; k < rows; ++k) {
+                double *restrict out = image + row_number[k] * stride;
+                const ptrdiff_t first = (ptrdiff_t)row_number[k] * width;
+                for (int i = 0; i < vectors; ++i)
+                    stage_2(&r_of[k], &f, &values, i);
+                finish(1.0, vectors, &r_of[k], &f, &values);
+                judge(&values, vectors, &b);
+                found += settle(&values, vectors, 0, count, out + at, 1, grid->white, first + at,
+                    unsettled + found);
+                finish(-1.0, vectors, &r_of[k], &f, &values);
+                judge(&values, vectors, &b);
+                found += settle(&values, vectors, middle, count, out + mirrored, -1, grid->white, first + mirrored,
+                    unsettled + found);
+            }
+        }
+    }
+    return found;
+}
+
+ptrdiff_t centred_sphere_stable_rows(
+    double *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_stable_scene *scene,
+    int row_begin, int row_end, ptrdiff_t *unsettled)
+{
+    /* rows [first, last) have their twins among them */
+    const int height = grid->height, first = row_begin > height - row_end ? row_begin : height - row_end;
+    const int last = height - first;
+
+    ptrdiff_t found = settle_rows(
+        image, stride, grid, scene, row_begin, first < last ? first : row_end, 0, unsettled);
+    found += settle_rows(
+        image, stride, grid, scene, first, first < last ? height - height / 2 : first, 1, unsettled + found);
+    found += settle_rows(
+        image, stride, grid, scene, first < last ? last : row_end, row_end, 0, unsettled + found);
+    return found;
+}
+
+ptrdiff_t centred_sphere_stable_row_pairs(
+    double *image, ptrdiff_t stride, const symrender_grid *grid,
+    const centred_sphere_stable_scene *scene,
+    int row_begin, int row_end, ptrdiff_t *unsettled)
+{
+    return settle_rows(image, stride, grid, scene, row_begin, row_end, 1, unsettled);
+}
+
+/* The larger of the two distances from an axis. */
+static inline double farther(double a, double b)
+{
+    return fabs(a) > fabs(b) ? fabs(a) : fabs(b);
+}
+
+ptrdiff_t centred_sphere_stable_box(
+    double *image, ptrdiff_t stride, const symrender_box *box,
+    const centred_sphere_stable_scene *scene,
+    int row_begin, int row_end, ptrdiff_t *unsettled)
+{
+    const symrender_grid *grid = &box->grid;
+    const int begin = box->column_begin, end = box->column_end, width = grid->width;
+    const int first = row_begin > box->row_begin ? row_begin : box->row_begin;
+    const int last = row_end < box->row_end ? row_end : box->row_end;
+    if (begin >= end || first >= last)
+        return 0;
+
+    const frame f = frame_of(scene);
+    const double unit = f.plane_unit;
+    const double pixel = grid->pixel, step = pixel * unit;
+    const double left = 0.5 - 0.5 * width, top = 0.5 * grid->height - 0.5;
+    const bounds b = bounds_within(scene, &f, farther((begin + left) * step, (end - 1 + left) * step),
+        farther((top - box->row_begin) * step, (top - (box->row_end - 1)) * step));
+    ptrdiff_t found = 0;
+    block values SYMRENDER_ALIGNED;
+
+    for (int j = first; j < last; ++j) {
+        double *restrict out = image + j * stride;
+        const row r = row_of((top - j) * pixel * unit, &f);
+        for (int at = begin, count; at < end; at += count) {
+            count = end - at < POINTS ? end - at : POINTS;
+            const int vectors = whole_vectors(count);
+            for (int i = 0; i < vectors; ++i)
+                stage_1((at + i + left) * step, &r, &f, &values, i);
+            for (int i = 0; i < vectors; ++i)
+                stage_2(&r, &f, &values, i);
             finish(1.0, vectors, &r, &f, &values);
             judge(&values, vectors, &b);
-            found += settle(&values, 0, count, out + at, 1, grid->white, (ptrdiff_t)j * width + at, unsettled + found);
-            finish(-1.0, vectors, &r, &f, &values);
-            judge(&values, vectors, &b);
-            found += settle(&values, middle, count, out + mirrored, -1, grid->white, (ptrdiff_t)j * width + mirrored,
+            clear_misses(&values, vectors, scene->background);
+            found += settle(&values, vectors, 0, count, out + at, 1, grid->white, (ptrdiff_t)j * width + at,
                 unsettled + found);
         }
-        for (int i = end; i < width; ++i)
-            out[i] = background;
     }
     return found;
 }
@@ -635,26 +747,25 @@ SYMRENDER_INLINE void shade_block(block *found, const double *restrict block_x, 
     }
     for (int i = 0; i < length; ++i) {
         const row r = row_of(block_y[i] * unit, f);
-        stage_2(1.0, &r, f, found, i);
+        stage_2(&r, f, found, i);
+    }
+    for (int i = 0; i < length; ++i) {
+        const row r = row_of(block_y[i] * unit, f);
+        stage_3(1.0, &r, f, found, i);
     }
     if (f->half_exponent > 0) {
         whole_powers_of_pair(found->cos2, found->cos2_lo, found->highlight, found->highlight_lo, f->half_exponent,
             length);
     } else {
         for (int i = 0; i < length; ++i)
-            stage_3(found, i);
+            stage_4(found, i);
         for (int i = 0; i < length; ++i)
-            stage_4(f, found, i);
+            stage_5(f, found, i);
     }
     for (int i = 0; i < length; ++i)
-        stage_5(f, found, i);
+        stage_6(f, found, i);
     judge(found, length, limits);
-    for (int i = 0; i < length; ++i) {
-        const int is_miss = surely_misses(found->facing2[i], found->d_dot_d[i]);
-        found->value[i] = is_miss ? background : found->value[i];
-        found->value_lo[i] = is_miss ? 0.0 : found->value_lo[i];
-        found->error[i] = is_miss ? 0.0 : found->error[i];
-    }
+    clear_misses(found, length, background);
 }
 
 ptrdiff_t centred_sphere_stable_points(
@@ -668,7 +779,7 @@ ptrdiff_t centred_sphere_stable_points(
         const int length = count - at < POINTS ? (int)(count - at) : POINTS;
         block values_here SYMRENDER_ALIGNED;
         shade_block(&values_here, x + at, y + at, length, &f, &b, scene->background);
-        found += settle(&values_here, 0, length, values + at, 1, white, at, unsettled + found);
+        found += settle(&values_here, length, 0, length, values + at, 1, white, at, unsettled + found);
     }
     return found;
 }
@@ -705,6 +816,27 @@ ptrdiff_t centred_sphere_stable_batch(
         const int end = row_end - top < height ? (int)(row_end - top) : (int)height;
         const ptrdiff_t listed = centred_sphere_stable_rows(
             images + k * image_stride, stride, &grids[k], &scenes[k], begin, end, unsettled + found);
+        for (ptrdiff_t i = 0; i < listed; ++i)
+            unsettled[found + i] += k * pixels;
+        found += listed;
+    }
+    return found;
+}
+
+ptrdiff_t centred_sphere_stable_boxes(
+    double *images, ptrdiff_t image_stride, ptrdiff_t stride,
+    const symrender_box *boxes, const centred_sphere_stable_scene *scenes,
+    ptrdiff_t row_begin, ptrdiff_t row_end, ptrdiff_t *unsettled)
+{
+    const ptrdiff_t height = boxes->grid.height, pixels = height * boxes->grid.width;
+    ptrdiff_t found = 0;
+
+    for (ptrdiff_t k = row_begin / height; k * height < row_end; ++k) {
+        const ptrdiff_t top = k * height;
+        const int begin = row_begin > top ? (int)(row_begin - top) : 0;
+        const int end = row_end - top < height ? (int)(row_end - top) : (int)height;
+        const ptrdiff_t listed = centred_sphere_stable_box(
+            images + k * image_stride, stride, &boxes[k], &scenes[k], begin, end, unsettled + found);
         for (ptrdiff_t i = 0; i < listed; ++i)
             unsettled[found + i] += k * pixels;
         found += listed;

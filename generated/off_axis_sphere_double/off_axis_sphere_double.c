@@ -36,8 +36,8 @@ typedef struct {
     int half_exponent;
     double zero_power, specular_gain, plane_unit, lamp_x, lamp_y, lamp_z, focal, d_dot_d_frame, tilt_frame,
         diffuse_gain, k_ambient, shininess;
-    double_double offset_y, alpha, depth, offset_x, row_mid_frame, row_gap_frame, row_disc_frame, row_half_frame,
-        x_left_frame, image_x, image_y, depth2;
+    double_double offset_y, alpha, depth, offset_x, row_mid_frame, row_gap_frame, focal2, row_half_frame, x_left_frame,
+        image_x, image_y, depth2;
 } frame;
 
 static frame frame_of(const off_axis_sphere_double_scene *scene)
@@ -81,7 +81,7 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
     const double_double row_mid_frame = dd_mul_double(depth, focal);   /* what is the same for a frame in row_mid */
     const double_double share_3 = dd_mul_double(offset_y, focal);
     const double_double row_gap_frame = dd_neg(share_3);   /* what is the same for a frame in row_gap */
-    const double_double row_disc_frame = dd_product(focal, focal);   /* what is the same for a frame in row_disc */
+    const double_double focal2 = dd_product(focal, focal);
     /* what is the same for a frame in row_half */
     const double_double row_half_frame = dd_add(alpha, dd_mul(offset_x, offset_x));
     const double_double x_left_frame = dd_div(dd_from(1.0), alpha);   /* what is the same for a frame in x_left */
@@ -116,7 +116,7 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
         .offset_x = offset_x,
         .row_mid_frame = row_mid_frame,
         .row_gap_frame = row_gap_frame,
-        .row_disc_frame = row_disc_frame,
+        .focal2 = focal2,
         .row_half_frame = row_half_frame,
         .x_left_frame = x_left_frame,
         .image_x = image_x,
@@ -133,7 +133,7 @@ static frame frame_of(const off_axis_sphere_double_scene *scene)
 
 /* What does not change within a row. */
 typedef struct {
-    double y, s_row, tilt_row, foot_y_row, foot_z_row, gap2_row;
+    double y, y2, tilt_row, foot_y_row, foot_z_row, dy2;
     double_double x_left, x_right;
 } row;
 
@@ -145,7 +145,7 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     /* by how much the row misses the centre */
     const double_double row_gap = dd_add(dd_mul_double(f->depth, y), f->row_gap_frame);
     /* positive where the plane through eye and row cuts the sphere */
-    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->row_disc_frame), dd_mul(row_gap, row_gap));
+    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->focal2), dd_mul(row_gap, row_gap));
     /* alpha times half the span's length */
     const double_double row_half = dd_sqrt(dd_positive_part(dd_mul(row_disc, f->row_half_frame)));
     /* the row's hits are x_left <= x <= x_right */
@@ -153,7 +153,7 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const double_double x_right = dd_mul(dd_add(row_mid, row_half), f->x_left_frame);
 
     /* ray and sphere [1 mul] */
-    const double s_row = y * y;   /* what is the same for a row in s */
+    const double y2 = y * y;
 
     /* normal [3 mul 2 add] */
     const double dy = y - f->image_y.hi - f->image_y.lo;
@@ -162,11 +162,11 @@ SYMRENDER_INLINE row row_of(double y, const frame *f)
     const double foot_z_row = y * dy;   /* what is the same for a row in foot_z */
 
     /* specular [1 mul] */
-    const double gap2_row = dy * dy;   /* what is the same for a row in gap2 */
+    const double dy2 = dy * dy;
 
     const row r = {
-        .y = y, .x_left = x_left, .x_right = x_right, .s_row = s_row, .tilt_row = tilt_row, .foot_y_row = foot_y_row,
-        .foot_z_row = foot_z_row, .gap2_row = gap2_row,
+        .y = y, .x_left = x_left, .x_right = x_right, .y2 = y2, .tilt_row = tilt_row, .foot_y_row = foot_y_row,
+        .foot_z_row = foot_z_row, .dy2 = dy2,
     };
     return r;
 }
@@ -214,7 +214,7 @@ SYMRENDER_INLINE double sight(double x, const row *r, const frame *f, double *su
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double facing2 = f->alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
 
     *sure = certainty(facing2, d_dot_d);
@@ -250,7 +250,7 @@ SYMRENDER_INLINE void stage_1(double x, const row *r, const frame *f, block *b, 
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double facing2 = f->alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
@@ -296,7 +296,7 @@ SYMRENDER_INLINE void stage_2(const row *r, const frame *f, block *b, int i)
     /* specular [4 mul 3 add] */
     const double bounce = 2.0 * b->facing[i];
     /* |m x D|^2 in radii = |D|^2 - facing^2, free of cancellation */
-    const double gap2 = f->depth2.hi * (b->dx[i] * b->dx[i] + b->tilt[i] * b->tilt[i] + r->gap2_row);
+    const double gap2 = f->depth2.hi * (b->dx[i] * b->dx[i] + b->tilt[i] * b->tilt[i] + r->dy2);
     const double turn = gap2 - b->facing2[i];   /* -|D|^2 cos 2a, a the angle of incidence */
 
     b->foot_y[i] = foot_y;

@@ -32,12 +32,12 @@
  *          background in two colours: the background is 0.0 in every direction
  *          colour: every colour of the scene is grey: one channel
  *          numbers above are those of the scene it was written for; any scene with the same effects may call it
- * ops      span: a frame: 3 mul 1 div 4 call, a sphere: 10 mul 7 add 3 div 2 sqrt 2 max 34 call, a row: 21 mul 12
- *            add 1 sqrt 2 max 18 call, a pixel: 24 mul 21 add 2 div 2 sqrt 1 max
+ * ops      span: a frame: 1 mul 1 div 4 call, a sphere: 6 mul 6 add 2 div 1 sqrt 1 max 32 call, a row: 5 mul 2 add
+ *            16 call, a pixel: 24 mul 21 add 2 div 2 sqrt 1 max
  *          lamp: a sphere: 3 add 3 div 6 call
  *          reach: a pixel: 6 mul 5 add
  *          matte: a pixel: 4 mul 2 add 1 div 1 sqrt 1 max 1 select
- *          glossy: a pixel: 20 mul 9 add 1 div 1 sqrt 1 max 4 select 1 call
+ *          glossy: a pixel: 20 mul 9 add 1 div 1 sqrt 1 max 4 select 2 call
  *          gate: a sphere: 1 mul, a pixel: 5 mul 3 add
  *          shadow: a pixel: 19 mul 15 add 1 select 1 call
  */
@@ -46,17 +46,21 @@
 #include "inline.h"
 #include "span.h"
 #include "units.h"
-#include "phong_power.h"
+#include "block.h"
+#include "lobe_power.h"
 #include "double_double.h"
 #include "exact_sign.h"
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum {
     CHANNELS = 1,
     POINTS = 128,   /* points shaded together: their arrays stay in the cache nearest to the processor */
-    LANES = 8       /* runs begin at its multiples, and loops end there: nobody reads what lies between two runs */
+    LANES = 8,      /* runs begin at its multiples, and loops end there: nobody reads what lies between two runs */
+    ROWS = 8,       /* rows whose spans are worked out side by side */
+    LINE = 64       /* bytes of a line of the cache: a vector that straddles two takes twice as long */
 };
 
 typedef scene_gated_shadow_double_scene scene_type;
@@ -65,7 +69,7 @@ typedef scene_gated_shadow_double_layers layer_set;
 
 static inline int padded(int count)
 {
-    return (count + LANES - 1) / LANES * LANES;
+    return (count + LANES - 1) & ~(LANES - 1);
 }
 
 static void *array(size_t count, size_t size)
@@ -82,7 +86,7 @@ typedef struct {
 
 /* Points that are shaded together, whatever they belong to. */
 typedef struct {
-    double value[CHANNELS][POINTS];
+    SYMRENDER_ALIGNED double value[CHANNELS][POINTS];
     double n_x[POINTS], n_y[POINTS], n_z[POINTS];   /* outward normal */
     double mirror_x[POINTS], mirror_y[POINTS], mirror_z[POINTS];   /* the ray mirrored there */
     double inv_d2[POINTS];   /* one over its length squared */
@@ -90,8 +94,11 @@ typedef struct {
     double light[POINTS];   /* how much of the lamp's light arrives */
     double cosine[POINTS];   /* max(0, n.l) */
     double lobe[POINTS], shininess[POINTS];   /* max(0, r.v)^n, and n */
+    /* from one loop of a highlight to the next */
+    double w_dot_mirror[POINTS], cos2[POINTS], sin2[POINTS], highlight_log2[POINTS], highlight[POINTS];
     double margin[POINTS];    /* by how much the closest of its decisions is sure; in doubt where it is not positive */
     double error[POINTS];     /* what rounding may have done to the value, in units of 2^-53 */
+    double ordinal[POINTS];   /* 0, 1, 2, ...: to count in vectors of the same length as all others */
     int count, runs;
     run run[POINTS];
 } points;
@@ -111,8 +118,8 @@ static inline double least(double a, double b)
 
 /* What does not change within a frame. */
 typedef struct {
-    double plane_unit, focal, d_dot_d_frame, tilt_frame, most_disc_frame, eye;
-    double_double row_disc_frame;
+    double plane_unit, focal, d_dot_d_frame, tilt_frame, eye;
+    double_double focal2;
 } span_frame;
 
 static span_frame span_frame_of(const scene_type *scene)
@@ -124,26 +131,20 @@ static span_frame span_frame_of(const scene_type *scene)
     /* silhouette [2 call] */
     /* rays D = (x, y, -f): f is e, in the unit of the image plane */
     const double focal = ldexp(scene->eye, plane_exponent);
-    const double_double row_disc_frame = dd_product(focal, focal);   /* what is the same for a frame in row_disc */
+    const double_double focal2 = dd_product(focal, focal);
 
     /* ray and sphere [1 mul] */
-    const double share_2 = focal * focal;
-    const double d_dot_d_frame = share_2;   /* what is the same for a frame in d_dot_d */
+    const double d_dot_d_frame = focal * focal;   /* what is the same for a frame in d_dot_d */
 
     /* normal [1 div] */
     const double tilt_frame = 1.0 / focal;   /* what is the same for a frame in tilt */
 
-    /* outline [2 mul] */
-    /* what is the same for a frame in most_disc */
-    const double most_disc_frame = 3.552713678800501e-15 * 281474976710657.0 * share_2;
-
     const span_frame carried = {
         .plane_unit = plane_unit,
         .focal = focal,
-        .row_disc_frame = row_disc_frame,
+        .focal2 = focal2,
         .d_dot_d_frame = d_dot_d_frame,
         .tilt_frame = tilt_frame,
-        .most_disc_frame = most_disc_frame,
         .eye = scene->eye,
     };
     return carried;
@@ -153,8 +154,7 @@ static span_frame span_frame_of(const scene_type *scene)
 typedef struct {
     double_double offset_y, alpha, depth, offset_x, row_mid_sphere, row_gap_sphere, row_half_sphere, x_left_sphere,
         image_x, image_y, power;
-    double row_low, row_high, ahead_sphere, gap_room_sphere, plain_gap_sphere, most_half_sphere, most_half_sphere_1,
-        most_half_sphere_2, outline_left_sphere;
+    double row_low, row_high, ahead_sphere;
 } span_sphere;
 
 static span_sphere span_sphere_of(const scene_type *scene, int k, const span_frame *f)
@@ -177,38 +177,26 @@ static span_sphere span_sphere_of(const scene_type *scene, int k, const span_fra
     const double_double offset_x = dd_div(dd_from(center_x), dd_from(radius));
     /* what is the same for a sphere in row_mid */
     const double_double row_mid_sphere = dd_mul_double(depth, f->focal);
-    const double_double share_11 = dd_mul_double(offset_y, f->focal);
-    const double_double row_gap_sphere = dd_neg(share_11);   /* what is the same for a sphere in row_gap */
-    const double_double share_12 = dd_add(alpha, dd_mul(offset_x, offset_x));
-    const double_double row_half_sphere = share_12;   /* what is the same for a sphere in row_half */
+    const double_double share_5 = dd_mul_double(offset_y, f->focal);
+    const double_double row_gap_sphere = dd_neg(share_5);   /* what is the same for a sphere in row_gap */
+    const double_double share_6 = dd_add(alpha, dd_mul(offset_x, offset_x));
+    const double_double row_half_sphere = share_6;   /* what is the same for a sphere in row_half */
     const double_double x_left_sphere = dd_div(dd_from(1.0), alpha);   /* what is the same for a sphere in x_left */
     /* where the centre appears on the image plane */
     const double_double image_x = dd_div(dd_mul_double(offset_x, f->focal), depth);
-    const double_double image_y = dd_div(share_11, depth);
+    const double_double image_y = dd_div(share_5, depth);
     /* kappa^2 - 1 */
     const double height2 = (distance.hi - radius + distance.lo) * (radius + distance.hi + distance.lo)
         / (radius * radius);
-    const double share_4 = offset_y.hi * depth.hi;
-    const double share_5 = sqrt(alpha.hi > 0.0 ? alpha.hi : 0.0);
-    const double share_6 = f->focal / height2;
-    const double row_low = (share_4 - share_5) * share_6;   /* the rows that meet the silhouette: row_disc = 0 */
-    const double row_high = (share_4 + share_5) * share_6;
+    const double share_1 = offset_y.hi * depth.hi;
+    const double share_2 = sqrt(alpha.hi > 0.0 ? alpha.hi : 0.0);
+    const double share_3 = f->focal / height2;
+    const double row_low = (share_1 - share_2) * share_3;   /* the rows that meet the silhouette: row_disc = 0 */
+    const double row_high = (share_1 + share_2) * share_3;
 
     /* distance [1 mul] */
-    const double_double power = share_12;   /* |m|^2 - 1: the power of the eye in radii, squared */
+    const double_double power = share_6;   /* |m|^2 - 1: the power of the eye in radii, squared */
     const double ahead_sphere = f->focal * depth.hi;   /* what is the same for a sphere in ahead */
-
-    /* outline [4 mul 1 add 1 div 1 sqrt 1 max 2 call] */
-    const double share_7 = fabs(offset_y.hi);
-    /* what is the same for a sphere in gap_room */
-    const double gap_room_sphere = 3.552713678800501e-15 * f->focal * share_7;
-    const double plain_gap_sphere = -(offset_y.hi * f->focal);   /* what is the same for a sphere in plain_gap */
-    const double most_half_sphere = fabs(offset_x.hi);   /* what is the same for a sphere in most_half */
-    const double most_half_sphere_1 = share_7;   /* what is the same for a sphere in most_half */
-    /* what is the same for a sphere in most_half */
-    const double most_half_sphere_2 = sqrt(alpha.hi + offset_x.hi * offset_x.hi > 0.0 ? alpha.hi + offset_x.hi
-        * offset_x.hi : 0.0);
-    const double outline_left_sphere = 1.0 / alpha.hi;   /* what is the same for a sphere in outline_left */
 
     const span_sphere carried = {
         .offset_y = offset_y,
@@ -225,23 +213,16 @@ static span_sphere span_sphere_of(const scene_type *scene, int k, const span_fra
         .row_high = row_high,
         .power = power,
         .ahead_sphere = ahead_sphere,
-        .gap_room_sphere = gap_room_sphere,
-        .plain_gap_sphere = plain_gap_sphere,
-        .most_half_sphere = most_half_sphere,
-        .most_half_sphere_1 = most_half_sphere_1,
-        .most_half_sphere_2 = most_half_sphere_2,
-        .outline_left_sphere = outline_left_sphere,
     };
     return carried;
 }
 
-/* What does not change within a row. */
+/* Where a row's hits begin and end. */
 typedef struct {
-    double y, s_row, tilt_row, n_y_row, n_z_row, ahead_row;
     double_double x_left, x_right;
-} span_row;
+} span_ends;
 
-SYMRENDER_INLINE span_row span_row_of(double y, const span_sphere *ball, const span_frame *f)
+SYMRENDER_INLINE span_ends span_ends_of(double y, const span_sphere *ball, const span_frame *f)
 {
     /* silhouette [16 call] */
     /* alpha times the span's middle */
@@ -250,16 +231,27 @@ SYMRENDER_INLINE span_row span_row_of(double y, const span_sphere *ball, const s
     /* by how much the row misses the centre */
     const double_double row_gap = dd_add(dd_mul_double(ball->depth, y), ball->row_gap_sphere);
     /* positive where the plane through eye and row cuts the sphere */
-    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->row_disc_frame), dd_mul(row_gap, row_gap));
+    const double_double row_disc = dd_sub(dd_add(dd_product(y, y), f->focal2), dd_mul(row_gap, row_gap));
     /* alpha times half the span's length */
     const double_double row_half = dd_sqrt(dd_positive_part(dd_mul(row_disc, ball->row_half_sphere)));
     /* the row's hits are x_left <= x <= x_right */
     const double_double x_left = dd_mul(dd_sub(row_mid, row_half), ball->x_left_sphere);
     const double_double x_right = dd_mul(dd_add(row_mid, row_half), ball->x_left_sphere);
 
+    const span_ends ends = {x_left, x_right};
+    return ends;
+}
+
+/* What does not change within a row. */
+typedef struct {
+    double y, y2, tilt_row, n_y_row, n_z_row, ahead_row;
+    double_double x_left, x_right;
+} span_row;
+
+SYMRENDER_INLINE span_row span_row_of(double y, span_ends ends, const span_sphere *ball, const span_frame *f)
+{
     /* ray and sphere [1 mul] */
-    const double share_1 = y * y;
-    const double s_row = share_1;   /* what is the same for a row in s */
+    const double y2 = y * y;
 
     /* normal [3 mul 2 add] */
     const double dy = y - ball->image_y.hi - ball->image_y.lo;
@@ -268,58 +260,19 @@ SYMRENDER_INLINE span_row span_row_of(double y, const span_sphere *ball, const s
     const double n_z_row = y * dy;   /* what is the same for a row in n_z */
 
     /* distance [1 mul] */
-    const double share_3 = y * ball->offset_y.hi;
-    const double ahead_row = share_3;   /* what is the same for a row in ahead */
+    const double ahead_row = y * ball->offset_y.hi;   /* what is the same for a row in ahead */
 
     const span_row carried = {
         .y = y,
-        .x_left = x_left,
-        .x_right = x_right,
-        .s_row = s_row,
+        .x_left = ends.x_left,
+        .x_right = ends.x_right,
+        .y2 = y2,
         .tilt_row = tilt_row,
         .n_y_row = n_y_row,
         .n_z_row = n_z_row,
         .ahead_row = ahead_row,
     };
     return carried;
-}
-
-/* Is there a pixel of this row left that may show the sphere? Asked before the row's own numbers are worked out, which
- * most spheres behind others are spared. */
-static int span_is_left(
-    double y, const span_sphere *ball, const span_frame *f, const int *owner, double left, double steps, int width)
-{
-    /* ray and sphere [1 mul] */
-    const double share_1 = y * y;
-
-    /* distance [1 mul] */
-    const double share_3 = y * ball->offset_y.hi;
-
-    /* outline [16 mul 10 add 1 sqrt 2 max 2 call] */
-    const double share_8 = fabs(y);
-    /* what rounding may do */
-    const double gap_room = ball->gap_room_sphere + 3.552713678800501e-15 * ball->depth.hi * share_8;
-    const double plain_gap = fabs(y * ball->depth.hi + ball->plain_gap_sphere);   /* |row_gap| in plain float64 */
-    const double less_gap = plain_gap - gap_room;
-    const double least_gap = less_gap > 0.0 ? less_gap : 0.0;   /* at most |row_gap| */
-    /* at least row_disc */
-    const double most_disc = 3.552713678800501e-15 * 281474976710657.0 * share_1 + f->most_disc_frame - least_gap
-        * least_gap;
-    /* at least row_half, and the rounding of the middle */
-    const double most_half = 3.552713678800501e-15 * ball->most_half_sphere
-        * (ball->ahead_sphere + share_8 * ball->most_half_sphere_1) + 3.552713678800501e-15 * 281474976710657.0
-        * sqrt(most_disc > 0.0 ? most_disc : 0.0) * ball->most_half_sphere_2;
-    const double share_9 = ball->ahead_sphere + share_3;
-    /* every hit lies between these */
-    const double outline_left = ball->outline_left_sphere * (ball->offset_x.hi * share_9 - most_half);
-    const double outline_right = ball->outline_left_sphere * (most_half + ball->offset_x.hi * share_9);
-
-    const pixel_span outline
-        = span_between(outline_left * steps - left - 1.0, outline_right * steps - left + 1.0, width);
-    int unowned = 0;
-    for (int i = outline.first; i <= outline.last; ++i)
-        unowned += owner[i] < 0;
-    return unowned;
 }
 
 /* The distance of the hit from the eye, in radii. */
@@ -332,7 +285,7 @@ static inline double span_distance(double x, const span_row *r, const span_spher
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double facing2 = ball->alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
     const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);   /* -n.D, how far the surface faces the ray: root / R */
 
@@ -382,7 +335,7 @@ SYMRENDER_INLINE double span_sight(
     const double chord = from_left * to_right;
     /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
     const double facing2 = ball->alpha.hi * chord;
-    const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+    const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const double d_dot_d = s + f->d_dot_d_frame;
 
     *sure = fabs(facing2) - 0x1p-40 * d_dot_d;
@@ -398,12 +351,59 @@ static int span_hits(double column, double plane_y, const span_row *r, const spa
     return sure > 0.0 ? sight > 0.0 : span_hits_exactly(column * pixel, plane_y, scene, k);
 }
 
+/* The spans of a sphere in some rows. */
+typedef struct {
+    double left[ROWS], left_low[ROWS], right[ROWS], right_low[ROWS];   /* the ends of its hits, in two words each, */
+    int first[ROWS], last[ROWS];   /* and the pixels from one to the other, */
+    int is_sure[ROWS];             /* and whether rounding cannot have changed which */
+} span_strip;
+
+static span_ends ends_in(const span_strip *s, int q)
+{
+    const span_ends ends = {{s->left[q], s->left_low[q]}, {s->right[q], s->right_low[q]}};
+    return ends;
+}
+
+/* The spans of ROWS rows, one at each y. What a row takes, dozens of operations that wait for one another, is then one
+ * vector of rows. */
+static void span_strip_of(span_strip *restrict s, const double *restrict y, const span_sphere *restrict ball,
+    const span_frame *restrict f, double left, double step, int width)
+{
+    for (int q = 0; q < ROWS; ++q) {
+        const span_ends ends = span_ends_of(y[q], ball, f);
+        s->left[q] = ends.x_left.hi;
+        s->left_low[q] = ends.x_left.lo;
+        s->right[q] = ends.x_right.hi;
+        s->right_low[q] = ends.x_right.lo;
+    }
+    const double steps = 1.0 / step, end = width;
+    for (int q = 0; q < ROWS; ++q) {
+        const double from = ceil(s->left[q] * steps - left), to = floor(s->right[q] * steps - left);
+        const double first = from < end ? (from > 0.0 ? from : 0.0) : end;
+        const double last = to > -1.0 ? (to < end - 1.0 ? to : end - 1.0) : -1.0;
+        s->first[q] = (int)first;
+        s->last[q] = (int)last;
+
+        /* outside are a miss and inside a hit, at both ends */
+        const span_row r = span_row_of(y[q], ends_in(s, q), ball, f);
+        double sure_before, sure_first, sure_last, sure_after;
+        const double before = span_sight((first - 1.0 + left) * step, &r, ball, f, &sure_before);
+        const double at_first = span_sight((first + left) * step, &r, ball, f, &sure_first);
+        const double at_last = span_sight((last + left) * step, &r, ball, f, &sure_last);
+        const double after = span_sight((last + 1.0 + left) * step, &r, ball, f, &sure_after);
+        const int none_before = (first < 1.0) | ((sure_before > 0.0) & (before < 0.0));
+        const int none_after = (last > end - 1.5) | ((sure_after > 0.0) & (after < 0.0));
+        const int both_hit = (sure_first > 0.0) & (at_first > 0.0) & (sure_last > 0.0) & (at_last > 0.0);
+        s->is_sure[q] = none_before & none_after & (both_hit | (first > last));
+    }
+}
+
 /* Fills the arrays for a run of points, the i-th of them at x = (first + i) step. */
 static void span_surface(points *p, int at, int count, double first, double step,
     const span_row *r, const span_sphere *ball, const span_frame *f)
 {
     for (int i = 0; i < padded(count); ++i) {
-        const double x = (first + i) * step;
+        const double x = (first + p->ordinal[i]) * step;
 
         /* ray and sphere [3 mul 6 add 1 sqrt 1 max] */
         /* distance to the two ends of the span, not negative inside it */
@@ -412,7 +412,7 @@ static void span_surface(points *p, int at, int count, double first, double step
         const double chord = from_left * to_right;
         /* disc / R^2 = alpha (x - x_left)(x_right - x): no cancellation at the silhouette */
         const double facing2 = ball->alpha.hi * chord;
-        const double s = x * x + r->s_row;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
+        const double s = x * x + r->y2;   /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
         const double d_dot_d = s + f->d_dot_d_frame;
         /* -n.D, how far the surface faces the ray: root / R */
         const double facing = sqrt(facing2 > 0.0 ? facing2 : 0.0);
@@ -529,6 +529,8 @@ struct scene_gated_shadow_double_frame {
     span_sphere *spans;   /* [visible] */
     int *row_first, *row_last;   /* [visible] the rows that may show a sphere */
     lamp *lamps;
+    int *half_exponents;   /* [receivers] n / 2 where n is an even whole number, else 0 */
+    int *spared;           /* [receivers] rounding cannot do too much to its values, however its lamps shine on it */
 };
 
 /* w from every point of the run to its lamp. */
@@ -568,7 +570,7 @@ static void shade_matte(points *p, int begin, int end)
     }
 }
 
-/* max(0, n.l) and max(0, r.v)^n of points that have their w. */
+/* max(0, n.l), and what a highlight's power is taken of, of points that have their w. */
 static void shade_glossy(points *p, int begin, int end)
 {
     for (int i = begin; i < end; ++i) {
@@ -577,7 +579,7 @@ static void shade_glossy(points *p, int begin, int end)
         /* n.l = n.w / |w| */
         const double n_dot_l = (p->n_x[i] * p->w_x[i] + p->n_y[i] * p->w_y[i] + p->n_z[i] * p->w_z[i]) * sqrt(inv_w2);
 
-        /* specular [16 mul 7 add 2 select 1 call]. Phong 1975, Illumination for computer generated pictures */
+        /* specular [16 mul 7 add] */
         /* r.v = w . mirror / (|w| |D|) */
         const double w_dot_mirror = p->mirror_x[i] * p->w_x[i] + p->mirror_y[i] * p->w_y[i] + p->mirror_z[i]
             * p->w_z[i];
@@ -589,19 +591,58 @@ static void shade_glossy(points *p, int begin, int end)
         const double side_z = p->mirror_y[i] * p->w_x[i] - p->mirror_x[i] * p->w_y[i];
         /* 1 - (r.v)^2, accurate where r.v is near 1 */
         const double sin2 = inv_w2_d2 * (side_x * side_x + side_y * side_y + side_z * side_z);
-        const double highlight = power_of_cosine(cos2, sin2, p->shininess[i]);   /* max(0, r.v)^n where r.v > 0 */
-        const double zero_power = p->shininess[i] == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
-        const double leaf = w_dot_mirror > 0.0 ? highlight : zero_power;   /* max(0, r.v)^n */
 
         /* diffuse [1 max 1 select]. Phong 1975, Illumination for computer generated pictures */
         const double share_1 = p->w2[i] > 0.0;
         /* max(0, n.l); a light at the point itself adds nothing */
         const double cosine = share_1 ? (n_dot_l > 0.0 ? n_dot_l : 0.0) : 0.0;
 
+        p->w_dot_mirror[i] = w_dot_mirror;
+        p->cos2[i] = cos2;
+        p->sin2[i] = sin2;
+        p->cosine[i] = cosine;
+    }
+}
+
+/* The powers of highlights: for an even whole exponent, 2 half_exponent, by squaring. */
+static void raise_lobes(points *p, int begin, int end, int half_exponent)
+{
+    if (half_exponent > 0) {
+        const int count = end - begin;
+        whole_powers_of_lobe(p->sin2 + begin, p->highlight_log2 + begin, p->highlight + begin, half_exponent, count);
+        return;
+    }
+    for (int i = begin; i < end; ++i) {
+        /* specular [1 call] */
+        const double highlight_log2 = log2_of_lobe(p->cos2[i], p->sin2[i]);   /* log2 (r.v)^2 */
+
+        p->highlight_log2[i] = highlight_log2;
+    }
+    for (int i = begin; i < end; ++i) {
+        /* specular [1 call]. Phong 1975, Illumination for computer generated pictures */
+        /* max(0, r.v)^n where r.v > 0 */
+        const double highlight = power_of_lobe(p->highlight_log2[i], p->shininess[i]);
+
+        p->highlight[i] = highlight;
+    }
+}
+
+/* max(0, r.v)^n of points that have their power. */
+static void finish_glossy(points *p, int begin, int end)
+{
+    for (int i = begin; i < end; ++i) {
+        const double highlight = p->highlight[i];
+
+        /* specular [2 select]. Phong 1975, Illumination for computer generated pictures */
+        const double zero_power = p->shininess[i] == 0.0 ? 1.0 : 0.0;   /* 0^n: 1 for n = 0 */
+        const double leaf = p->w_dot_mirror[i] > 0.0 ? highlight : zero_power;   /* max(0, r.v)^n */
+
+        /* diffuse */
+        const double share_1 = p->w2[i] > 0.0;
+
         /* specular [1 select] */
         const double lobe = share_1 ? leaf : 0.0;
 
-        p->cosine[i] = cosine;
         p->lobe[i] = lobe;
     }
 }
@@ -654,13 +695,13 @@ static int cast_shadows(points *p, const run *r, const lamp *l, const scene_type
 }
 
 /* Adds what the run's lamp brings. */
-static void accumulate(points *p, const run *r, const lamp *l)
+static void accumulate(points *p, const run *r, const lamp *l, int is_spared)
 {
     if (l->terms & GATED) {
         const double keen = l->keen;
         /* margin [1 mul] */
         const double keen_here = keen;
-        const double margin_sphere = keen_here * keen_here;   /* what is the same for a sphere in margin */
+        const double keen_here2 = keen_here * keen_here;
 
         for (int i = r->at; i < r->at + padded(r->count); ++i) {
             /* gate [3 mul 2 add] */
@@ -668,7 +709,7 @@ static void accumulate(points *p, const run *r, const lamp *l)
             const double n_dot_w = p->n_x[i] * p->w_x[i] + p->n_y[i] * p->w_y[i] + p->n_z[i] * p->w_z[i];
 
             /* margin [2 mul 1 add] */
-            const double margin = n_dot_w * n_dot_w - p->w2[i] * margin_sphere;   /* not above 0: in doubt */
+            const double margin = n_dot_w * n_dot_w - p->w2[i] * keen_here2;   /* not above 0: in doubt */
 
             const double sure = p->lobe[i] > 0.0 ? margin : INFINITY;
             p->margin[i] = least(sure, p->margin[i]);
@@ -676,7 +717,8 @@ static void accumulate(points *p, const run *r, const lamp *l)
         }
     }
     const double matte_error = l->matte_error, gloss_error = l->gloss_error, steepness = l->steepness;
-    for (int i = r->at; i < r->at + padded(r->count); ++i) {
+    const int end = is_spared ? r->at : r->at + padded(r->count);
+    for (int i = r->at; i < end; ++i) {
         const double matte = p->cosine[i] > 0.0 ? matte_error : 0.0;
         const double steep = l->terms & SPECULAR ? gloss_error * least(1.0, steepness * p->lobe[i]) : 0.0;
         const double told = matte + steep;
@@ -712,18 +754,18 @@ static void write_terms(
 static void shade(points *p, const frame *h, int bounces, const layer_set *layers, size_t pixel, size_t pixels)
 {
     const scene_type *scene = h->scene;
-    for (int i = 0; i < p->count; ++i)
-        p->error[i] = 0.0;
-    for (const run *r = p->run; r < p->run + p->runs; ++r)
+    for (const run *r = p->run; r < p->run + p->runs; ++r) {
+        const int end = r->at + padded(r->count);
         for (int c = 0; c < CHANNELS; ++c) {
             const double ambient = scene->ambient[CHANNELS * r->receiver + c];
-            for (int i = r->at; i < r->at + padded(r->count); ++i)
+            for (int i = r->at; i < end; ++i)
                 p->value[c][i] = ambient;
         }
-    for (const run *r = p->run; r < p->run + p->runs; ++r) {
         const double shininess = scene->shininess[r->receiver];
-        for (int i = r->at; i < r->at + padded(r->count); ++i)
+        for (int i = r->at; i < end; ++i)
             p->shininess[i] = shininess;
+        for (int i = r->at; i < end; ++i)
+            p->error[i] = 0.0;
     }
 
     /* the turn-th lamp of every run: points of different receivers share the loops */
@@ -750,14 +792,23 @@ static void shade(points *p, const frame *h, int bounces, const layer_set *layer
                    && (p->run[next].terms & SPECULAR) == is_glossy && (p->run[next].terms != 0) == is_lit)
                 ++next;
             const int begin = p->run[first].at, end = p->run[next - 1].at + padded(p->run[next - 1].count);
-            if (is_glossy)
+            if (is_glossy) {
                 shade_glossy(p, begin, end);
-            else if (is_lit)
+                for (int from = first, to; from < next; from = to) {
+                    const int half_exponent = h->half_exponents[p->run[from].receiver];
+                    to = from + 1;
+                    while (to < next && h->half_exponents[p->run[to].receiver] == half_exponent)
+                        ++to;
+                    raise_lobes(p, p->run[from].at, p->run[to - 1].at + padded(p->run[to - 1].count), half_exponent);
+                }
+                finish_glossy(p, begin, end);
+            } else if (is_lit) {
                 shade_matte(p, begin, end);
+            }
         }
         for (const run *r = p->run; r < p->run + p->runs; ++r)
             if (r->terms) {
-                accumulate(p, r, &h->lamps[r->lamp]);
+                accumulate(p, r, &h->lamps[r->lamp], h->spared[r->receiver]);
                 if (layers)
                     write_terms(p, r, &h->lamps[r->lamp], layers, pixel + (size_t)r->place, pixels);
             }
@@ -779,7 +830,9 @@ frame *scene_gated_shadow_double_prepare(const scene_type *scene, const symrende
     h->row_last = array(visible, sizeof *h->row_last);
     h->spans = array(visible, sizeof *h->spans);
     h->lamps = array((size_t)scene->lamps_begin[scene->receivers], sizeof *h->lamps);
-    if (!h->spans || !h->row_first || !h->row_last || !h->lamps) {
+    h->half_exponents = array((size_t)scene->receivers, sizeof *h->half_exponents);
+    h->spared = array((size_t)scene->receivers, sizeof *h->spared);
+    if (!h->spans || !h->row_first || !h->row_last || !h->lamps || !h->half_exponents || !h->spared) {
         scene_gated_shadow_double_release(h);
         return NULL;
     }
@@ -798,6 +851,14 @@ frame *scene_gated_shadow_double_prepare(const scene_type *scene, const symrende
     for (int k = 0; k < scene->receivers; ++k)
         for (int l = scene->lamps_begin[k]; l < scene->lamps_begin[k + 1]; ++l)
             h->lamps[l] = lamp_of(scene, k, scene->lamp_light[l], scene->lamp_terms[l]);
+    for (int k = 0; k < scene->receivers; ++k)
+        h->half_exponents[k] = half_of_whole(scene->shininess[k]);
+    for (int k = 0; k < scene->receivers; ++k) {
+        double most = 0.0;
+        for (int l = scene->lamps_begin[k]; l < scene->lamps_begin[k + 1]; ++l)
+            most += h->lamps[l].matte_error + h->lamps[l].gloss_error;
+        h->spared[k] = most < 0.999 * MOST_ROUNDOFFS;
+    }
     return h;
 }
 
@@ -809,6 +870,8 @@ void scene_gated_shadow_double_release(frame *h)
     free(h->row_first);
     free(h->row_last);
     free(h->lamps);
+    free(h->half_exponents);
+    free(h->spared);
     free(h);
 }
 
@@ -816,20 +879,41 @@ void scene_gated_shadow_double_release(frame *h)
 
 /* What a call of rows or points works in. */
 typedef struct {
+    void *memory;       /* in which points lie, where a line of the cache begins */
     points *points;     /* one for each level of mirrors */
-    int *owner;         /* [width] which of the row's spheres a pixel shows; then the plane's materials; -1: none */
-    int *start;         /* [rows + 1] where each row's list of spheres begins in */
-    int *active;        /* the spheres that may show in each row, front to back */
-    span_row *span_rows;   /* [most in a row] */
+    pixel_span *gap;    /* [width / 2 + 1] the pixels of the row that nobody has taken, from left to right */
+    int *start;         /* [strips + 1] where the list of spheres of each strip of ROWS rows begins in */
+    int *active;        /* the spheres that may show in each strip, front to back */
+    span_strip *strips; /* [most in a strip] */
+    span_row *span_rows;
 } workspace;
+
+/* Where the first line of the cache begins in some memory. */
+static void *line_of_cache(void *memory)
+{
+    return (char *)memory + (LINE - (uintptr_t)memory % LINE) % LINE;
+}
 
 static void drop(workspace *w)
 {
-    free(w->points);
-    free(w->owner);
+    free(w->memory);
+    free(w->gap);
     free(w->start);
     free(w->active);
+    free(w->strips);
     free(w->span_rows);
+}
+
+/* The strips from row_begin on that a sphere may show in: from the first to the last of them. */
+static int first_strip(const frame *h, int k, int row_begin)
+{
+    return h->row_first[k] > row_begin ? (h->row_first[k] - row_begin) / ROWS : 0;
+}
+
+static int last_strip(const frame *h, int k, int row_begin, int row_end)
+{
+    const int last = h->row_last[k] < row_end - 1 ? h->row_last[k] : row_end - 1;
+    return last >= row_begin ? (last - row_begin) / ROWS : -1;
 }
 
 /* Memory for these rows, and their lists of spheres. Returns 0 where there is none. */
@@ -837,29 +921,33 @@ static int take(workspace *w, const frame *h, int row_begin, int row_end, int wi
 {
     const workspace none = {0};
     *w = none;
-    w->points = array(1, sizeof *w->points);
-    w->owner = array((size_t)width, sizeof *w->owner);
-    if (!w->points || !w->owner)
+    w->memory = array(1, sizeof *w->points + LINE);
+    w->points = w->memory ? line_of_cache(w->memory) : NULL;
+    for (int i = 0; w->points && i < POINTS; ++i)
+        w->points->ordinal[i] = i;
+    w->gap = array((size_t)width / 2 + 1, sizeof *w->gap);
+    if (!w->points || !w->gap)
         return 0;
-    const int rows = row_end - row_begin;
+    const int strips = (row_end - row_begin + ROWS - 1) / ROWS;
     size_t most = 0;
-    w->start = array((size_t)rows + 2, sizeof *w->start);
+    w->start = array((size_t)strips + 2, sizeof *w->start);
     if (!w->start)
         return 0;
     for (int k = 0; k < h->scene->visible; ++k)
-        for (int j = h->row_first[k] > row_begin ? h->row_first[k] : row_begin; j <= h->row_last[k] && j < row_end; ++j)
-            ++w->start[j - row_begin + 2];
-    for (int j = 0; j < rows; ++j) {
-        most = (size_t)w->start[j + 2] > most ? (size_t)w->start[j + 2] : most;
-        w->start[j + 2] += w->start[j + 1];
+        for (int s = first_strip(h, k, row_begin); s <= last_strip(h, k, row_begin, row_end); ++s)
+            ++w->start[s + 2];
+    for (int s = 0; s < strips; ++s) {
+        most = (size_t)w->start[s + 2] > most ? (size_t)w->start[s + 2] : most;
+        w->start[s + 2] += w->start[s + 1];
     }
-    w->active = array((size_t)w->start[rows + 1], sizeof *w->active);
+    w->active = array((size_t)w->start[strips + 1], sizeof *w->active);
+    w->strips = array(most, sizeof *w->strips);
     w->span_rows = array(most, sizeof *w->span_rows);
-    if (!w->active || !w->span_rows)
+    if (!w->active || !w->strips || !w->span_rows)
         return 0;
     for (int k = 0; k < h->scene->visible; ++k)
-        for (int j = h->row_first[k] > row_begin ? h->row_first[k] : row_begin; j <= h->row_last[k] && j < row_end; ++j)
-            w->active[w->start[j - row_begin + 1]++] = k;
+        for (int s = first_strip(h, k, row_begin); s <= last_strip(h, k, row_begin, row_end); ++s)
+            w->active[w->start[s + 1]++] = k;
     return 1;
 }
 
@@ -868,7 +956,10 @@ static int take_for_points(workspace *w, const frame *h)
 {
     const workspace none = {0};
     *w = none;
-    w->points = array(1, sizeof *w->points);
+    w->memory = array(1, sizeof *w->points + LINE);
+    w->points = w->memory ? line_of_cache(w->memory) : NULL;
+    for (int i = 0; w->points && i < POINTS; ++i)
+        w->points->ordinal[i] = i;
     (void)h;
     w->span_rows = array(2, sizeof *w->span_rows);
     return w->points != NULL && w->span_rows != NULL;
@@ -877,7 +968,7 @@ static int take_for_points(workspace *w, const frame *h)
 /* The row's own numbers of sphere k, in the slot of the workspace that its place in the row's list gives it. */
 static void enter_row(workspace *w, const frame *h, int slot, int k, double y)
 {
-    w->span_rows[slot] = span_row_of(y, &h->spans[k], &h->span);
+    w->span_rows[slot] = span_row_of(y, span_ends_of(y, &h->spans[k], &h->span), &h->spans[k], &h->span);
 }
 
 static int hits(
@@ -969,6 +1060,127 @@ static void surface(points *p, const workspace *w, const frame *h, int slot, int
     span_surface(p, r->at, count, first, step, &w->span_rows[slot], &h->spans[receiver], &h->span);
 }
 
+/* Where the pixels of a row go. */
+typedef struct {
+    double *out;                /* the row of the image, */
+    const layer_set *layers;    /* what is asked for beside it, */
+    size_t row;                 /* and the number of the row's first pixel in the image */
+    double plane_y;             /* its place on the image plane */
+    double left, step;          /* pixel i is at x = (i + left) step */
+    const double *background;   /* [CHANNELS] */
+} row_place;
+
+/* Writes the background to the pixels [begin, end) of a row. */
+static void paint_background(const frame *h, const row_place *to, int begin, int end)
+{
+    const scene_type *scene = h->scene;
+    for (int i = begin; i < end; ++i)
+        for (int c = 0; c < CHANNELS; ++c)
+            to->out[CHANNELS * i + c] = to->background[c];
+    const layer_set *layers = to->layers;
+    for (int i = begin; layers && i < end; ++i) {
+        const size_t place = to->row + (size_t)i;
+        if (layers->depth)
+            layers->depth[place] = INFINITY;
+        if (layers->index)
+            layers->index[place] = -1;
+        if (layers->background) {
+            for (int c = 0; c < CHANNELS; ++c)
+                layers->background[CHANNELS * place + (size_t)c] = scene->background[c];
+        }
+    }
+}
+
+/* Makes points of the pixels [begin, end) of one receiver: as many at a time as there is room for, the others when
+ * these have been shaded. Returns how many of them were in doubt. */
+static ptrdiff_t add_pixels(
+    workspace *w, const frame *h, const row_place *to, int slot, int receiver, int begin, int end, ptrdiff_t *unsettled)
+{
+    points *p = w->points;
+    ptrdiff_t found = 0;
+    for (int at = begin, some; at < end; at += some) {
+        if (p->count == POINTS)
+            found += flush(p, h, to->out, to->layers, to->row, unsettled ? unsettled + found : NULL);
+        some = end - at < POINTS - p->count ? end - at : POINTS - p->count;
+        p->run[p->runs].place = at;
+        surface(p, w, h, slot, receiver, some, at + to->left, to->step);
+        if (to->layers)
+            write_geometry(p, w, h, to->layers, to->row, slot, to->left, to->step);
+    }
+    return found;
+}
+
+/* The rows of a strip that begins with this one, for all spheres that may show in it. */
+static void enter_strip(workspace *w, const frame *h, const int *active, int count, int row)
+{
+    const double unit = h->span.plane_unit, pixel = h->grid.pixel;
+    const double left = 0.5 - 0.5 * h->grid.width, top = 0.5 * h->grid.height - 0.5;
+    double y[ROWS];
+    for (int q = 0; q < ROWS; ++q)
+        y[q] = (top - (row + q)) * pixel * unit;
+    for (int slot = 0; slot < count; ++slot)
+        span_strip_of(&w->strips[slot], y, &h->spans[active[slot]], &h->span, left, pixel * unit, h->grid.width);
+}
+
+/* The row's own numbers of the sphere in a slot. */
+static void enter_row_of_strip(workspace *w, const frame *h, int slot, int k, int in_strip, double y)
+{
+    w->span_rows[slot] = span_row_of(y, ends_in(&w->strips[slot], in_strip), &h->spans[k], &h->span);
+}
+
+/* The pixels of a row that hit the sphere in a slot: between the ends in closed form, settled by an exact test where
+ * rounding may have moved them. */
+static pixel_span span_in_row(const workspace *w, const frame *h, int slot, int k, int in_strip, const row_place *to)
+{
+    const span_strip *s = &w->strips[slot];
+    pixel_span span = {s->first[in_strip], s->last[in_strip]};
+    if (s->is_sure[in_strip])
+        return span;
+    const double unit = h->span.plane_unit, pixel = h->grid.pixel, step = to->step, left = to->left, y = to->plane_y;
+    const span_sphere *ball = &h->spans[k];
+    const span_frame *f = &h->span;
+    const span_row r = span_row_of(y * unit, ends_in(s, in_strip), ball, f);
+    const int width = h->grid.width;
+    while (span.first > 0 && span_hits(span.first - 1 + left, y, &r, ball, f, pixel, step, h->scene, k))
+        --span.first;
+    while (span.last < width - 1 && span_hits(span.last + 1 + left, y, &r, ball, f, pixel, step, h->scene, k))
+        ++span.last;
+    while (span.first <= span.last && !span_hits(span.first + left, y, &r, ball, f, pixel, step, h->scene, k))
+        ++span.first;
+    while (span.last >= span.first && !span_hits(span.last + left, y, &r, ball, f, pixel, step, h->scene, k))
+        --span.last;
+    return span;
+}
+
+/* The first of the gaps, from left to right, that ends at a pixel or right of it. */
+static int gap_from(const pixel_span *gap, int gaps, int pixel)
+{
+    int low = 0, high = gaps;
+    while (low < high) {
+        const int middle = (low + high) / 2;
+        if (gap[middle].last < pixel)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Takes pixels from gap g, which holds them: none, one or two gaps stay of it. Returns how many there are in all. */
+static int take_from_gap(pixel_span *gap, int gaps, int g, pixel_span taken)
+{
+    const pixel_span before = {gap[g].first, taken.first - 1}, after = {taken.last + 1, gap[g].last};
+    const int has_before = before.first <= before.last, has_after = after.first <= after.last;
+    const int stay = has_before + has_after;
+    if (stay != 1)
+        memmove(gap + g + stay, gap + g + 1, (size_t)(gaps - g - 1) * sizeof *gap);
+    if (has_before)
+        gap[g] = before;
+    if (has_after)
+        gap[g + has_before] = after;
+    return gaps - 1 + stay;
+}
+
 ptrdiff_t scene_gated_shadow_double_rows(
     double *image, ptrdiff_t stride, const frame *h, const layer_set *layers, int row_begin, int row_end,
     ptrdiff_t *unsettled)
@@ -976,7 +1188,7 @@ ptrdiff_t scene_gated_shadow_double_rows(
     const scene_type *scene = h->scene;
     const int width = h->grid.width;
     const double unit = h->span.plane_unit;
-    const double pixel = h->grid.pixel, step = pixel * unit, steps = 1.0 / step;
+    const double pixel = h->grid.pixel, step = pixel * unit;
     const double left = 0.5 - 0.5 * width, top = 0.5 * h->grid.height - 0.5;
     double background[CHANNELS];
     for (int c = 0; c < CHANNELS; ++c)
@@ -988,76 +1200,44 @@ ptrdiff_t scene_gated_shadow_double_rows(
         return -1;
     }
     for (int j = row_begin; j < row_end; ++j) {
-        double *out = image + j * stride;
         const double plane_y = (top - j) * pixel;
-        const size_t row = (size_t)j * (size_t)width;
-        for (int i = 0; i < width; ++i)
-            w.owner[i] = -1;
-        const int *active = w.active + w.start[j - row_begin];
-        const int count = w.start[j - row_begin + 1] - w.start[j - row_begin];
-        int left_over = width;
-        for (int slot = 0; slot < count && left_over > 0; ++slot) {
+        const pixel_span whole = {0, width - 1};
+        w.gap[0] = whole;
+        int gaps = 1;
+        const row_place here = {
+            image + j * stride, layers, (size_t)j * (size_t)width, plane_y, left, step, background,
+        };
+        const int strip = (j - row_begin) / ROWS, in_strip = (j - row_begin) % ROWS;
+        const int *active = w.active + w.start[strip];
+        const int count = w.start[strip + 1] - w.start[strip];
+        if (in_strip == 0)
+            enter_strip(&w, h, active, count, j);
+
+        /* front to back, each sphere gets what is left of its span */
+        for (int slot = 0; slot < count && gaps > 0; ++slot) {
             const int k = active[slot];
-            if (!span_is_left(plane_y * unit, &h->spans[k], &h->span, w.owner, left, steps, width))
+            const pixel_span span = span_in_row(&w, h, slot, k, in_strip, &here);
+            int g = span.first <= span.last ? gap_from(w.gap, gaps, span.first) : gaps;
+            if (g == gaps || w.gap[g].first > span.last)
                 continue;
-            enter_row(&w, h, slot, k, plane_y * unit);
-
-            /* the hits of a row are one span of pixels, its ends in closed form and settled by an exact test */
-            const span_row *r = &w.span_rows[slot];
-            pixel_span span = span_between(r->x_left.hi * steps - left, r->x_right.hi * steps - left, width);
-            while (span.first > 0 && hits(&w, h, slot, k, span.first - 1 + left, plane_y, pixel, step))
-                --span.first;
-            while (span.last < width - 1 && hits(&w, h, slot, k, span.last + 1 + left, plane_y, pixel, step))
-                ++span.last;
-            while (span.first <= span.last && !hits(&w, h, slot, k, span.first + left, plane_y, pixel, step))
-                ++span.first;
-            while (span.last >= span.first && !hits(&w, h, slot, k, span.last + left, plane_y, pixel, step))
-                --span.last;
-            int painted = 0;
-            for (int i = span.first; i <= span.last; ++i) {
-                painted += w.owner[i] < 0;
-                w.owner[i] = w.owner[i] < 0 ? slot : w.owner[i];
+            enter_row_of_strip(&w, h, slot, k, in_strip, plane_y * unit);
+            while (g < gaps && w.gap[g].first <= span.last) {
+                const pixel_span seen = {
+                    w.gap[g].first > span.first ? w.gap[g].first : span.first,
+                    w.gap[g].last < span.last ? w.gap[g].last : span.last,
+                };
+                found += add_pixels(
+                    &w, h, &here, slot, k, seen.first, seen.last + 1, unsettled ? unsettled + found : NULL);
+                const int is_split = w.gap[g].first < seen.first;
+                gaps = take_from_gap(w.gap, gaps, g, seen);
+                g += is_split;
             }
-            left_over -= painted;
         }
 
-        /* runs of pixels of one owner: shaded together with what follows, as many at a time as there is room for */
-        points *p = w.points;
-        p->count = p->runs = 0;
-        for (int i = 0, end; i < width; i = end) {
-            const int owner = w.owner[i];
-            end = i + 1;
-            while (end < width && w.owner[end] == owner)
-                ++end;
-            if (owner < 0) {
-                for (int q = i; q < end; ++q) {
-                    for (int c = 0; c < CHANNELS; ++c) {
-                        out[CHANNELS * q + c] = background[c];
-                        if (layers && layers->background)
-                            layers->background[CHANNELS * (row + (size_t)q) + (size_t)c] = scene->background[c];
-                    }
-                }
-                if (layers && layers->depth)
-                    for (int q = i; q < end; ++q)
-                        layers->depth[row + (size_t)q] = INFINITY;
-                if (layers && layers->index)
-                    for (int q = i; q < end; ++q)
-                        layers->index[row + (size_t)q] = -1;
-                continue;
-            }
-            const int receiver = active[owner];
-            for (int begin = i, some; begin < end; begin += some) {
-                if (p->count == POINTS)
-                    found += flush(p, h, out, layers, row, unsettled ? unsettled + found : NULL);
-                some = end - begin < POINTS - p->count ? end - begin : POINTS - p->count;
-                p->run[p->runs].place = begin;
-                surface(p, &w, h, owner, receiver, some, begin + left, step);
-                if (layers)
-                    write_geometry(p, &w, h, layers, row, owner, left, step);
-            }
-        }
-        if (p->count > 0)
-            found += flush(p, h, out, layers, row, unsettled ? unsettled + found : NULL);
+        for (int g = 0; g < gaps; ++g)
+            paint_background(h, &here, w.gap[g].first, w.gap[g].last + 1);
+        if (w.points->count > 0)
+            found += flush(w.points, h, here.out, layers, here.row, unsettled ? unsettled + found : NULL);
     }
     drop(&w);
     return found;

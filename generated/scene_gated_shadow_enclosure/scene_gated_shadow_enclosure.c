@@ -39,6 +39,7 @@
 #include "units.h"
 #include "double_double.h"
 #include "ball.h"
+#include "settle.h"
 #include "ball_power.h"
 #include "exact_sign.h"
 #include <math.h>
@@ -74,7 +75,7 @@ typedef struct {
 /* What does not change within a sphere. */
 typedef struct {
     double focal;
-    ball d_dot_d_frame, depth, offset_y, cross_x_sphere, offset_x, cross_y_sphere, before_eye_sphere, power;
+    ball focal2, depth, offset_y, cross_x_sphere, offset_x, cross_y_sphere, before_eye_sphere, power;
     double m_x, m_y, m_z, m_size;   /* C - E in radii, and |m_x| + |m_y| + |m_z|, in plain floating point */
 } near_sphere;
 
@@ -118,7 +119,7 @@ static near_sphere near_of(const place *c, double eye)
 {
     /* ray and sphere [10 call] */
     const double focal = eye;   /* rays D = (x, y, -f): f is e, in the unit of the image plane */
-    const ball d_dot_d_frame = ball_product(focal, focal);   /* what is the same for a frame in d_dot_d */
+    const ball focal2 = ball_product(focal, focal);
     const ball distance = ball_add_double(ball_neg(c->z), eye);   /* of the eye from the plane of the centre */
     const ball depth = ball_div(distance, c->radius);   /* kappa: the same in radii */
     const ball offset_y = ball_div(c->y, c->radius);
@@ -135,7 +136,7 @@ static near_sphere near_of(const place *c, double eye)
 
     const near_sphere sphere = {
         .focal = focal,
-        .d_dot_d_frame = d_dot_d_frame,
+        .focal2 = focal2,
         .depth = depth,
         .offset_y = offset_y,
         .cross_x_sphere = cross_x_sphere,
@@ -324,7 +325,7 @@ static int near_hits(const ray *r, const tables *h, int k)
     /* ray and sphere [21 call] */
     /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const ball s = ball_add(ball_product(r->x, r->x), ball_product(r->y, r->y));
-    const ball d_dot_d = ball_add(s, sphere->d_dot_d_frame);
+    const ball d_dot_d = ball_add(s, sphere->focal2);
     const ball cross_x = ball_add(ball_mul_double(sphere->depth, r->y), sphere->cross_x_sphere);
     const ball cross_y = ball_sub(sphere->cross_y_sphere, ball_mul_double(sphere->depth, r->x));   /* m x D in radii */
     const ball cross_z = ball_sub(ball_mul_double(sphere->offset_x, r->y), ball_mul_double(sphere->offset_y, r->x));
@@ -347,7 +348,7 @@ SYMRENDER_INLINE void near_surface(site *at, const ray *r, const near_sphere *sp
     /* ray and sphere [18 call] */
     /* s = x^2 + y^2, A = |D|^2 = s + f^2 */
     const ball s = ball_add(ball_product(r->x, r->x), ball_product(r->y, r->y));
-    const ball d_dot_d = ball_add(s, sphere->d_dot_d_frame);
+    const ball d_dot_d = ball_add(s, sphere->focal2);
     const ball cross_x = ball_add(ball_mul_double(sphere->depth, r->y), sphere->cross_x_sphere);
     const ball cross_y = ball_sub(sphere->cross_y_sphere, ball_mul_double(sphere->depth, r->x));   /* m x D in radii */
     const ball cross_z = ball_sub(ball_mul_double(sphere->offset_x, r->y), ball_mul_double(sphere->offset_y, r->x));
@@ -567,6 +568,18 @@ static int is_in_range(double scaled, double unit, double coordinate)
     return scaled / unit == coordinate && fabs(scaled) < 0x1p200;
 }
 
+/* The intensity at a point of the image plane; what is unknown may be anything. */
+static void enclose(ball total[CHANNELS], double x, double y, const tables *h)
+{
+    ray r = {.x = x * h->unit, .y = y * h->unit, .plane_x = x, .plane_y = y};
+    r.length = sqrt(r.x * r.x + r.y * r.y + h->eye * h->eye);
+    r.size = fabs(r.x) + fabs(r.y) + h->eye;
+    const int is_known = is_in_range(r.x, h->unit, x) && is_in_range(r.y, h->unit, y) && look(total, &r, h);
+    for (int c = 0; c < CHANNELS; ++c)
+        if (!(is_known && total[c].error < INFINITY))
+            total[c] = ball_unknown();
+}
+
 int scene_gated_shadow_enclosure_points(double *hi, double *lo, double *error,
     const double *x, const double *y, ptrdiff_t count, const scene_type *scene)
 {
@@ -576,32 +589,57 @@ int scene_gated_shadow_enclosure_points(double *hi, double *lo, double *error,
         return -1;
     }
     for (ptrdiff_t i = 0; i < count; ++i) {
-        ray r = {.x = x[i] * h.unit, .y = y[i] * h.unit, .plane_x = x[i], .plane_y = y[i]};
-        r.length = sqrt(r.x * r.x + r.y * r.y + h.eye * h.eye);
-        r.size = fabs(r.x) + fabs(r.y) + h.eye;
         ball total[CHANNELS];
-        const int is_known = is_in_range(r.x, h.unit, x[i])
-            && is_in_range(r.y, h.unit, y[i]) && look(total, &r, &h);
+        enclose(total, x[i], y[i], &h);
         for (int c = 0; c < CHANNELS; ++c) {
-            const ball value = is_known && total[c].error < INFINITY ? total[c] : ball_unknown();
-            hi[CHANNELS * i + c] = value.hi;
-            lo[CHANNELS * i + c] = value.lo;
-            error[CHANNELS * i + c] = value.error;
+            hi[CHANNELS * i + c] = total[c].hi;
+            lo[CHANNELS * i + c] = total[c].lo;
+            error[CHANNELS * i + c] = total[c].error;
         }
     }
     drop(&h);
     return 0;
 }
 
-int scene_gated_shadow_enclosure_batch(double *hi, double *lo, double *error,
-    const double *x, const double *y, const ptrdiff_t *begin, const scene_gated_shadow_enclosure_scene *scenes, ptrdiff_t count)
+double scene_gated_shadow_enclosure_settle(double *values, unsigned char *is_settled,
+    const double *x, const double *y, ptrdiff_t count, int rule, double white, const scene_type *scene)
 {
+    tables h;
+    if (!take(&h, scene)) {
+        drop(&h);
+        return -1.0;
+    }
+    double largest = 0.0;
+    for (ptrdiff_t i = 0; i < count; ++i) {
+        ball total[CHANNELS];
+        enclose(total, x[i], y[i], &h);
+        int all = 1;
+        double error = 0.0;
+        for (int c = 0; c < CHANNELS; ++c) {
+            const settled_value found = settled_by((settling_rule)rule, ball_centre(total[c]), total[c].error);
+            values[CHANNELS * i + c] = found.value > white ? white : found.value;
+            all &= found.is_settled;
+            error = fmax(error, total[c].error);
+        }
+        is_settled[i] = (unsigned char)all;
+        largest = all ? fmax(largest, error) : largest;
+    }
+    drop(&h);
+    return largest;
+}
+
+double scene_gated_shadow_enclosure_batch(double *values, unsigned char *is_settled, const double *x, const double *y,
+    const ptrdiff_t *begin, int rule, double white, const scene_gated_shadow_enclosure_scene *scenes, ptrdiff_t count)
+{
+    double largest = 0.0;
     for (ptrdiff_t k = 0; k < count; ++k) {
         const ptrdiff_t at = begin[k], points = begin[k + 1] - at;
-        if (points > 0
-            && scene_gated_shadow_enclosure_points(hi + at * 1, lo + at * 1, error + at * 1,
-                x + at, y + at, points, &scenes[k]))
-            return -1;
+        const double error = points > 0
+            ? scene_gated_shadow_enclosure_settle(values + at * 1, is_settled + at, x + at, y + at, points, rule, white, &scenes[k])
+            : 0.0;
+        if (error < 0.0)
+            return -1.0;
+        largest = fmax(largest, error);
     }
-    return 0;
+    return largest;
 }

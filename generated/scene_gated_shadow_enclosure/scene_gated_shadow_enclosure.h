@@ -43,9 +43,15 @@ typedef struct {
 int scene_gated_shadow_enclosure_points(double *hi, double *lo, double *error,
     const double *x, const double *y, ptrdiff_t count, const scene_gated_shadow_enclosure_scene *scene);
 
+/* Settles the intensities at those points: writes values [count][1] by a rule, at most `white`, and which points have
+ * all of theirs settled. Returns the largest error of those, or -1 where there is no memory.
+ *     rule  0: within 4 ulp   1: the nearest float64   2: the nearest float32   3: the grey level of 0 to 255 */
+double scene_gated_shadow_enclosure_settle(double *values, unsigned char *is_settled,
+    const double *x, const double *y, ptrdiff_t count, int rule, double white, const scene_gated_shadow_enclosure_scene *scene);
+
 /* The same for many scenes of one structure: points begin[k] <= i < begin[k + 1] are those of scene k, k < count. */
-int scene_gated_shadow_enclosure_batch(double *hi, double *lo, double *error, const double *x, const double *y,
-    const ptrdiff_t *begin, const scene_gated_shadow_enclosure_scene *scenes, ptrdiff_t count);
+double scene_gated_shadow_enclosure_batch(double *values, unsigned char *is_settled, const double *x, const double *y,
+    const ptrdiff_t *begin, int rule, double white, const scene_gated_shadow_enclosure_scene *scenes, ptrdiff_t count);
 
 #ifdef __cplusplus
 }

@@ -16,4 +16,10 @@ typedef struct {
     double white;   /* intensities above it are written as it: 1 for a picture, INFINITY for the field */
 } symrender_grid;
 
+/* Some pixels of a grid: columns [column_begin, column_end) of rows [row_begin, row_end), none beyond its edges. */
+typedef struct {
+    symrender_grid grid;
+    int column_begin, column_end, row_begin, row_end;
+} symrender_box;
+
 #endif

@@ -7,7 +7,7 @@ points, comments) is in templates/kernel.c.j2 and kernel.h.j2, which contain no 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 
 import jinja2
@@ -60,8 +60,7 @@ CARRIED = {
 class Emitted:
     """The text of a kernel. `files` maps file names to text (the kernel's own two first); `cdef` is what cffi reads.
 
-    `fields` are names and shapes of a scene kernel's structure, see symrender_cg.emit.scene_fields. `mirrored` are
-    those of a pixel's operations that the pixels at x and -x share.
+    `fields` are names and shapes of a scene kernel's structure, see symrender_cg.emit.scene_fields.
     """
 
     name: str
@@ -71,7 +70,6 @@ class Emitted:
     result_type: str
     operations: dict[str, dict[str, int]]
     fields: tuple[tuple[str, str], ...] = ()
-    mirrored: Mapping[str, int] = field(default_factory=dict)
 
 
 def emit(
@@ -93,7 +91,8 @@ def emit(
         return repr(float(numbers[factor])) if numbers is not None else f"scene->{factor}"
 
     writer = Bodies(program, baked=numbers is not None)
-    shared = tuple(program[entry] for stage in program.stages[: program.mirrored] for entry in stage)
+    twins = tuple(program[entry] for stage in program.stages[: program.twins] for entry in stage)
+    shared = tuple(program[entry] for stage in program.stages[program.twins : program.mirrored] for entry in stage)
     uses = {node.function for step in program.steps for node in walk(step.value) if isinstance(node, Call)}
     uses |= {program.shortcut.function} if program.shortcut else set()
     formats = {step.format for step in program.steps}
@@ -127,6 +126,7 @@ def emit(
         "result": program.result,
         "tests_front": len(program.hit) > 1,
         "sight": program.hit,
+        "twin_counts": counts(twins) if twins else "",
         "shared_counts": counts(shared) if shared else "",
         "stages": stages_of(program, writer.frame_places, writer.pixel_places),
         "writer": writer,
@@ -146,7 +146,6 @@ def emit(
         inputs=tuple(entry.removeprefix("scene_") for entry in program.inputs),
         result_type=str(context["real"]),
         operations={rate: dict(operations(program.at(rate))) for rate in RATES if rate != "sphere"},
-        mirrored=dict(operations(shared)),
     )
 
 

@@ -25,6 +25,7 @@ class Stage:
     """One stage in C.
 
     mirrored   it is the same for x and -x
+    twin       and for y and -y, too
     sided      it reads what is odd in x, with the sign of `side`
     takes      which of x, place, row and frame it reads
     replaced   the shortcut of the program computes what it leaves, where it may
@@ -32,6 +33,7 @@ class Stage:
 
     number: int
     mirrored: bool
+    twin: bool
     sided: bool
     takes: frozenset[str]
     told: tuple[str, ...]
@@ -93,6 +95,11 @@ class Stages:
         return tuple(stage for stage in self.each if stage.mirrored)
 
     @property
+    def twins(self) -> tuple[Stage, ...]:
+        """Those of them that are the same for y and -y."""
+        return tuple(stage for stage in self.each if stage.twin)
+
+    @property
     def others(self) -> tuple[Stage, ...]:
         """Those that are not."""
         return tuple(stage for stage in self.each if not stage.mirrored)
@@ -132,9 +139,9 @@ def stages_of(program: KernelProgram, frame: Mapping[str, str], places: Mapping[
     found: list[Stage] = []
     for number, (names, left) in enumerate(zip(program.stages, leaves, strict=True), 1):
         steps = tuple(program[name] for name in names)
-        mirrored = number <= program.mirrored
-        side = {} if mirrored else parity
-        found.append(_stage(number, steps, left, done, side, places, formats, frame, mirrored, wide))
+        shared = (number <= program.mirrored) + (number <= program.twins)
+        side = {} if shared else parity
+        found.append(_stage(number, steps, left, done, side, places, formats, frame, shared, wide))
         done |= set(left)
     kinds = {name: "double" if form in WIDE else str(C_TYPES[form].name) for name, form in formats.items()}
     arrays = declared((kinds[name.removesuffix(_LOW)], f"{name}[POINTS]") for name in dict.fromkeys(carried))
@@ -180,7 +187,7 @@ def _stage(
     places: Mapping[str, str],
     formats: Mapping[str, str],
     frame: Mapping[str, str],
-    mirrored: bool,
+    shared: int,
     wide: frozenset[str],
 ) -> Stage:
     own = {step.name for step in steps}
@@ -212,6 +219,7 @@ def _stage(
     takes |= {"row"} if any(place == "r->" for name, place in places.items() if name in uses) else set()
     takes |= {"frame"} if any(place == "f->" for name, place in frame.items() if name in uses) else set()
     sections = ", ".join(dict.fromkeys(step.section for step in steps))
-    heading = f"Stage {number}{', the same for x and -x' if mirrored else ''}: {sections} [{counts(steps)}]."
+    same = ("", ", the same for x and -x", ", the same for x and -x, y and -y")[shared]
+    heading = f"Stage {number}{same}: {sections} [{counts(steps)}]."
     told_lines = textwrap.wrap(f"{heading} Leaves {', '.join(left)}.", WIDTH - 6, break_long_words=False)
-    return Stage(number, mirrored, bool(odd), frozenset(takes), tuple(told_lines), tuple(lines))
+    return Stage(number, shared > 0, shared > 1, bool(odd), frozenset(takes), tuple(told_lines), tuple(lines))

@@ -14,13 +14,13 @@ Where to cut: where the cycles of the stages and of the values that cross, by a 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from symrender_cg.lower.formats import WIDE
 from symrender_cg.lower.nodes import Call, Cast, Quotient, Root, walk
 from symrender_cg.lower.program import KernelProgram, Shortcut, Step, operations_of
-from symrender_cg.lower.symmetry import parities
+from symrender_cg.lower.symmetry import alike_in_twin_rows, parities
 
 ISSUED, IN_VIEW, CROSSING, LOOP = 3.0, 100.0, 1.0, 1.0
 """Operations issued a cycle; operations at which a stage takes as many cycles, by waiting; cycles of a value that
@@ -62,8 +62,9 @@ _WIDE_CALLS: Mapping[str, int] = {
 _SIMPLE = ("add", "mul", "max", "select")
 
 
-def cut(program: KernelProgram, *, fission: bool, symmetry: bool) -> KernelProgram:
-    """The program with the steps of its pixels in stages; the first `mirrored` of them are the same for x and -x.
+def cut(program: KernelProgram, *, fission: bool, symmetry: bool, twins: bool) -> KernelProgram:
+    """The program with the steps of its pixels in stages; the first `mirrored` of them are the same for x and -x, the
+    first `twins` of these for y and -y too.
 
     ray, normal, light, diffuse, specular  ->  (ray, normal), (what x and -x share), (light, diffuse), (log2), (2^y)
     """
@@ -76,17 +77,25 @@ def cut(program: KernelProgram, *, fission: bool, symmetry: bool) -> KernelProgr
     shared = _leading_to(pixel, parity) if parity else ()
     names = {step.name for step in shared}
     rest = tuple(step for step in pixel if step.name not in names)
-    needed = {name for step in rest for name in step.uses()} | outcome
-    first = _cut(shared, needed) if fission else tuple(tuple(s.name for s in part) for part in (shared,) if part)
+    alike = alike_in_twin_rows(program) if twins and shared else frozenset()
+    halves = [part for part in _parted(shared, alike) if part]
+    first = tuple(stage for part in halves for stage in _stages(part, (*halves, rest), outcome, fission))
+    in_both = sum(set(stage) <= alike for stage in first)
     parts = _around(rest, program.shortcut)
     last = tuple(stage for part in parts for stage in _stages(part, parts, outcome, fission))
     stages = (*first, *last)
     if program.shortcut is None:
-        return replace(program, stages=stages, mirrored=len(first))
+        return replace(program, stages=stages, mirrored=len(first), twins=in_both)
     replaced = {step.name for step in _standing_for(rest, program.shortcut)}
     where = tuple(number for number, names in enumerate(stages) if set(names) <= replaced)
     assert {name for number in where for name in stages[number]} == replaced, "what is replaced is in stages of its own"
-    return replace(program, stages=stages, mirrored=len(first), shortcut=replace(program.shortcut, stages=where))
+    shortcut = replace(program.shortcut, stages=where)
+    return replace(program, stages=stages, mirrored=len(first), twins=in_both, shortcut=shortcut)
+
+
+def _parted(steps: tuple[Step, ...], names: Collection[str]) -> tuple[tuple[Step, ...], tuple[Step, ...]]:
+    """Those with these names, and the others."""
+    return tuple(s for s in steps if s.name in names), tuple(s for s in steps if s.name not in names)
 
 
 def _standing_for(steps: tuple[Step, ...], shortcut: Shortcut) -> tuple[Step, ...]:
@@ -110,7 +119,7 @@ def _around(steps: tuple[Step, ...], shortcut: Shortcut | None) -> tuple[tuple[S
 
 
 def _stages(
-    part: tuple[Step, ...], parts: tuple[tuple[Step, ...], ...], outcome: set[str], fission: bool
+    part: tuple[Step, ...], parts: Sequence[tuple[Step, ...]], outcome: set[str], fission: bool
 ) -> tuple[tuple[str, ...], ...]:
     """The stages of one part of the steps; what the parts after it use is kept."""
     after = parts[parts.index(part) + 1 :]

@@ -94,7 +94,8 @@ def lower(
         return lobe.with_steps(replace(step, value=_folded(step.value.xreplace(n))) for step in lobe.steps)
 
     def cut_in_stages(program: KernelProgram) -> KernelProgram:
-        return cut(program, fission=variant.passes.fission, symmetry=variant.passes.symmetry)
+        chosen = variant.passes
+        return cut(program, fission=chosen.fission, symmetry=chosen.symmetry, twins=chosen.twins)
 
     staged = variant.staged and not plan.needs("front_test")
     anchored = staged and variant.passes.anchors and variant.shading == "float32"

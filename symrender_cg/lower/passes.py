@@ -312,13 +312,21 @@ def hoist(program: KernelProgram) -> KernelProgram:
     rates = program.input_rates()
     steps: list[Step] = []
     known: dict[tuple[sp.Basic, Format], sp.Symbol] = {}
+    taken = {*program.inputs, *(step.name for step in program.steps)}
     for step in program.steps:
         slower: list[Step] = []
-        value = _hoisted(step.value, step, rates, slower, known)
+        value = _hoisted(step.value, step, rates, slower, known, taken)
         for new in (*slower, replace(step, value=value)):
             rates[new.name] = RATES.index(new.rate)
             steps.append(new)
     return program.with_steps(steps)
+
+
+def _name_of_square(value: sp.Basic) -> str | None:
+    """focal2 for focal^2; None for what is not the square of a name."""
+    if isinstance(value, sp.Pow) and isinstance(value.base, sp.Symbol) and value.exp == 2:
+        return f"{value.base.name.removeprefix('scene_')}2"
+    return None
 
 
 def _hoisted(
@@ -327,6 +335,7 @@ def _hoisted(
     rates: dict[str, int],
     slower: list[Step],
     known: dict[tuple[sp.Basic, Format], sp.Symbol],
+    taken: set[str],
 ) -> sp.Basic:
     def rate_of(expression: sp.Basic) -> int:
         return max((rates.get(s.name, 0) for s in expression.free_symbols), default=0)
@@ -337,8 +346,11 @@ def _hoisted(
         key = expression, step.format
         if key not in known:
             word: Rate = RATES[rate]
-            stem = f"{step.name}_{word}"
+            square = _name_of_square(expression)
+            is_square = square is not None and square not in taken
+            stem = square if square is not None and is_square else f"{step.name}_{word}"
             name = stem if all(s.name != stem for s in slower) else f"{stem}_{len(slower)}"
+            taken.add(name)
             known[key] = symbol(name)
             slower.append(
                 replace(
@@ -346,7 +358,7 @@ def _hoisted(
                     name=name,
                     value=expression,
                     rate=word,
-                    meaning=f"what is the same for a {word} in {step.name}",
+                    meaning="" if is_square else f"what is the same for a {word} in {step.name}",
                     source="",
                 )
             )
@@ -366,12 +378,12 @@ def _hoisted(
                 joined = value.func(*members)
                 parts.append(named(joined, rate) if symbols_only and not (rate == 0 and joined.is_Number) else joined)
             else:
-                parts += [_hoisted(member, step, rates, slower, known) for member in members]
+                parts += [_hoisted(member, step, rates, slower, known, taken) for member in members]
         return value.func(*parts)
     rebuilt = [
         named(argument, rate_of(argument))
         if rate_of(argument) < here and argument.is_Pow
-        else _hoisted(argument, step, rates, slower, known)
+        else _hoisted(argument, step, rates, slower, known, taken)
         for argument in value.args
     ]
     return value.func(*rebuilt)

@@ -81,6 +81,7 @@ class KernelProgram:
     anchors  float32 numbers of a pixel that move one for one with x, and the hit that each is counted from: anchors.py
     stages   names of the steps of a pixel in the stages of fission.py, or none: then they are one piece
     mirrored how many of the stages, from the first on, are the same for the pixels at x and -x
+    twins    how many of these, from the first on, are the same for the rows at y and -y, too
     shortcut what computes a step for a whole block where a number of the frame is not 0, in place of some stages
     """
 
@@ -98,6 +99,7 @@ class KernelProgram:
     anchors: tuple[tuple[str, Anchor], ...] = ()
     stages: tuple[tuple[str, ...], ...] = ()
     mirrored: int = 0
+    twins: int = 0
     shortcut: Shortcut | None = None
 
     def __getitem__(self, name: str) -> Step:

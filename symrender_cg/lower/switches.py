@@ -14,6 +14,7 @@ class Passes:
     """Which passes run. Where one does not apply to a scene it changes nothing.
 
     symmetry   what the pixels at x and -x share is computed once (symmetry.py); the first part of each sum is even
+    twins      and of that, what the rows at y and -y share, once for both
     fission    the steps of a pixel in short loops over a block (fission.py)
     halves     a power in two steps, its logarithm and 2^y, so that fission may cut between them
     whole      an exponent that is an argument, even and whole: by squaring instead, a block at a time (lobe_power.h);
@@ -23,6 +24,7 @@ class Passes:
     """
 
     symmetry: bool = True
+    twins: bool = True
     fission: bool = True
     halves: bool = True
     whole: bool = True

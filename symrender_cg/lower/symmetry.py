@@ -1,8 +1,9 @@
-"""Symmetry: what the pixels at x and -x of a row have in common, found by looking and not by being told.
+"""Symmetry: what the pixels at x and -x have in common, and those at y and -y, found by looking and not by being told.
 
-Comes in: a KernelProgram, before freezing (`gather_mirrored`) or after (`parities`). Goes out: the same program with
-the symmetric parts of its sums and products as steps of their own; the parity in x of each of its steps. Never done
-here: a decision for a kind of scene. Where the sphere lies off the axis nothing is even, and nothing changes.
+Comes in: a KernelProgram, before freezing (`gather_mirrored`) or after (`parities`, `alike_in_twin_rows`). Goes out:
+the same program with the symmetric parts of its sums and products as steps of their own; the parity in x of each of its
+steps; which of them twin rows share. Never done here: a decision for a kind of scene. Where the sphere lies off the
+axis nothing is even, and nothing changes.
 
 A step is even where it is the same for x and -x, and odd where it is the same up to its sign. After freezing this is a
 statement on bits: rounding to nearest commutes with a change of sign, sums and products commute, so two trees of
@@ -126,12 +127,7 @@ def parities(program: KernelProgram) -> dict[str, Parity]:
 
     Empty unless the two ends of a row's hits mirror one another: without that no two pixels of a row correspond.
     """
-    numbers = _Numbers()
-    here, there = ({"x": numbers.of_symbol("x")}, {"x": _negated(numbers.of_symbol("x"))})
-    for step in program.steps:
-        if step.rate in ("row", "pixel"):
-            for known in (here, there):
-                known[step.name] = numbers.of(step.value, known)
+    here, there = _both_sides(program, "x")
     ends = [here.get(name) for name in program.ends or ()]
     if len(ends) != 2 or ends[0] is None or ends[1] != _negated(ends[0]):
         return {}
@@ -142,6 +138,33 @@ def parities(program: KernelProgram) -> dict[str, Parity]:
         elif here[step.name] == _negated(there[step.name]):
             found[step.name] = "odd"
     return found
+
+
+def alike_in_twin_rows(program: KernelProgram) -> frozenset[str]:
+    """The steps of a pixel that are the same in the rows at y and -y, and are made of such steps alone.
+
+    Empty unless both rows have their hits, and the numbers that their pixels are counted from, at the same places.
+    """
+    here, there = _both_sides(program, "y")
+    places = {*(program.ends or ()), *(name for name, _ in program.anchors)}
+    if not program.ends or any(here[name] != there[name] for name in places):
+        return frozenset()
+    pixel, found = {step.name for step in program.at("pixel")}, set(places)
+    for step in program.at("pixel"):
+        if here[step.name] == there[step.name] and step.uses() & pixel <= found:
+            found.add(step.name)
+    return frozenset(found & pixel)
+
+
+def _both_sides(program: KernelProgram, axis: str) -> tuple[dict[str, _Signed], dict[str, _Signed]]:
+    """The numbers of the steps of rows and pixels, here and where x or y is replaced by its negative."""
+    numbers = _Numbers()
+    here, there = {axis: numbers.of_symbol(axis)}, {axis: _negated(numbers.of_symbol(axis))}
+    for step in program.steps:
+        if step.rate in ("row", "pixel"):
+            for known in (here, there):
+                known[step.name] = numbers.of(step.value, known)
+    return here, there
 
 
 _SUMS: Mapping[str, tuple[str, bool]] = {

@@ -69,7 +69,7 @@ class Kernel:
         """The grid structure as C sees it, to be reused over calls."""
         return self.library.ffi.new("symrender_grid *", (width, height, pixel, white))
 
-    def onto(self, image: NDArray[Any], numbers: Any, grid: Any, *, first: int = 0) -> Callable[[int, int], None]:
+    def onto(self, image: NDArray[Any], numbers: Any, grid: Any, *, first: int = 0) -> NativeRows:
         """The C function that writes rows [begin, end), bound to everything else: a call of it runs no Python.
 
         first: the row that row 0 of the array is; it may hold a part of the image's rows. The array must be kept.
@@ -82,7 +82,7 @@ class Kernel:
             if self.baked
             else NativeRows(entry, pointer, stride, grid, numbers)
         )
-        rows.library = self.library
+        rows.library, rows.pairs = self.library, self._pairs
         return rows
 
     def onto_many(self, images: NDArray[Any], numbers: NDArray[np.float64], grids: NDArray[Any]) -> Callable[..., None]:
@@ -97,7 +97,7 @@ class Kernel:
         strides = images.strides[0] // item, images.strides[1] // item
         grid, scenes = ffi.from_buffer("symrender_grid *", grids), ffi.from_buffer("double *", numbers)
         rows = NativeRows(self._entry("batch"), pointer, *strides, grid, scenes)
-        rows.library = self.library
+        rows.library, rows.pairs = self.library, None
         return rows
 
     def points(
@@ -115,12 +115,17 @@ class Kernel:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what another process finds for itself."""
-        return {name: value for name, value in self.__dict__.items() if name != "_rows_of"}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_rows_of", "_pairs")}
 
     @cached_property
     def _rows_of(self) -> tuple[Any, str]:
         """The entry point for rows, and the pointer that it takes."""
         return self._entry("rows"), f"{self._real} *"
+
+    @cached_property
+    def _pairs(self) -> Any:
+        """The entry point for rows at y and -y together, None where they share nothing."""
+        return getattr(self.library.lib, f"{self.name}_row_pairs", None)
 
     @property
     def _real(self) -> str:

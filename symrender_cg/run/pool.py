@@ -57,26 +57,45 @@ class Shared:
     def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
         """Draws rows [begin, end) on so many threads, at least so many rows at a time."""
 
+    def folded(self, begin: int, end: int) -> Shared | None:
+        """What draws rows [begin, end) folded in the middle, the first with the last, where that takes less time."""
+        return None
+
 
 class NativeRows(partial[None], Shared):
     """A C function bound to all but the rows [begin, end) that it draws: a call of it runs no Python.
 
     The arguments are (image, stride, grid, scene), the same without the scene, or (images, image_stride, stride, grids,
     scenes).
+
+    pairs   the C function that draws rows j and height - 1 - j for begin <= j < end, or None
     """
 
-    __slots__ = ("library",)
+    __slots__ = ("library", "pairs")
     library: Library
+    pairs: Any
     least_pixels = SPHERE_PIXELS
 
     def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
         """Draws rows [begin, end) on so many threads, at least so many rows at a time."""
+        folded = self.folded(begin, end)
+        if folded is not None:
+            folded.share(pool, 0, end - end // 2, -(-least // 2), threads)
+            return
         arguments = self.args
         entry, addresses, pointer_type = pool.kinds[len(arguments)]
         function = addresses.get(self.func)
         if function is None:
             function = addresses[self.func] = pool.library.ffi.cast(pointer_type, self.func)
         entry(function, *arguments, begin, end, least, threads)
+
+    def folded(self, begin: int, end: int) -> NativeRows | None:
+        """Rows j and height - 1 - j as one, where rows [begin, end) are the whole image and the kernel has them."""
+        if self.pairs is None or begin != 0 or end != self.args[2].height:
+            return None
+        rows = NativeRows(self.pairs, *self.args)
+        rows.library, rows.pairs = self.library, None
+        return rows
 
 
 class Pool:

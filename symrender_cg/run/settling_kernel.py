@@ -16,25 +16,43 @@ from symrender_cg.run.scratch import scratch
 
 
 class SettlingRows(Shared):
-    """Rows of an image that a kernel settles; what it leaves over is collected in `left_over`, places of the image."""
+    """Rows of an image that a kernel settles; what it leaves over is collected in `left_over`, places of the image.
 
-    __slots__ = ("arguments", "entry", "image", "left_over", "library")
+    arguments   the image, its stride, the grid and the scene, as C takes them; the image must be kept
+    width       pixels of what counts as a row
+    pairs       the entry point that settles rows j and height - 1 - j for begin <= j < end, or None
+    """
+
+    __slots__ = ("arguments", "entry", "left_over", "library", "pairs", "width")
     least_pixels = SETTLED_PIXELS
 
-    def __init__(self, library: Library, entry: Any, arguments: tuple[Any, Any, Any, Any], image: NDArray[Any]) -> None:
-        self.library, self.entry, self.arguments, self.image = library, entry, arguments, image
+    def __init__(
+        self, library: Library, entry: Any, arguments: tuple[Any, Any, Any, Any], width: int, pairs: Any = None
+    ) -> None:
+        self.library, self.entry, self.arguments, self.width, self.pairs = library, entry, arguments, width, pairs
         self.left_over: list[NDArray[np.intp]] = []
 
     def __call__(self, begin: int, end: int, /) -> None:
-        places = scratch((end - begin) * self.image.shape[1])
-        found = self.entry(*self.arguments, begin, end, self.library.ffi.cast("ptrdiff_t *", places.ctypes.data))
+        places = scratch((end - begin) * self.width)
+        found = self.entry(*self.arguments, begin, end, self.library.ffi.from_buffer("ptrdiff_t *", places))
         self.left_over.append(places[:found].copy())
 
     def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
         """Settles rows [begin, end) on so many threads, at least so many rows at a time."""
-        width = self.image.shape[1]
-        found = pool.listing_rows(self.entry, *self.arguments, begin, end, least, threads, width)
-        self.left_over.append(found)
+        folded = self.folded(begin, end)
+        if folded is not None:
+            folded.share(pool, 0, end - end // 2, -(-least // 2), threads)
+            return
+        self.left_over.append(pool.listing_rows(self.entry, *self.arguments, begin, end, least, threads, self.width))
+
+    def folded(self, begin: int, end: int) -> SettlingRows | None:
+        """Rows j and height - 1 - j as one, where rows [begin, end) are the whole image and the kernel has them; what
+        is left over goes to the same list."""
+        if self.pairs is None or begin != 0 or end != self.arguments[2].height:
+            return None
+        rows = SettlingRows(self.library, self.pairs, self.arguments, 2 * self.width)
+        rows.left_over = self.left_over
+        return rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +96,14 @@ class SettlingKernel(Kernel):
         """As `settle_rows`, of an image of that height whose rows from `first` on the array holds; the threads of the
         pool may draw them."""
         grid = self.grid(image.shape[1], height, pixel, white)
-        bound = pointer_to(image, f"{self._real} *", self.library, first=first), image.strides[0] // image.itemsize
-        return SettlingRows(self.library, self._entry("rows"), (*bound, grid, numbers), image)
+        entry, kind = self._rows_of
+        bound = pointer_to(image, kind, self.library, first=first), image.strides[0] // image.itemsize
+        return SettlingRows(self.library, entry, (*bound, grid, numbers), image.shape[1], self._pairs)
+
+    @property
+    def box_entry(self) -> Any:
+        """The C function (image, stride, box, scene, begin, end, places) -> how many pixels are left over."""
+        return self._entry("box")
 
     def settle_many(
         self, images: NDArray[Any], numbers: NDArray[np.float64], grids: NDArray[Any]
@@ -87,13 +111,26 @@ class SettlingKernel(Kernel):
         """What writes rows [begin, end) of many images, counted through, as `onto_many` does; it returns the pixels
         (k * height + row) * width + column that are not settled. Releases the GIL. All three arrays must be kept.
         """
-        ffi, width = self.library.ffi, images.shape[2]
-        entry = self.onto_many(images, numbers, grids)
+        return self._listing_many("batch", "symrender_grid *", images, numbers, grids)
+
+    def settle_boxes(
+        self, images: NDArray[Any], numbers: NDArray[np.float64], boxes: NDArray[Any]
+    ) -> Callable[[int, int], NDArray[np.intp]]:
+        """The same of a box of each image; boxes: (count,) of symrender_cg.run.box_pixels.BOX."""
+        return self._listing_many("boxes", "symrender_box *", images, numbers, boxes)
+
+    def _listing_many(
+        self, entry: str, kind: str, images: NDArray[Any], numbers: NDArray[np.float64], which: NDArray[Any]
+    ) -> Callable[[int, int], NDArray[np.intp]]:
+        function, buffer, width = self._entry(entry), self.library.ffi.from_buffer, images.shape[2]
+        pointer = pointer_to(images, f"{self._real} *", self.library)
+        strides = images.strides[0] // images.itemsize, images.strides[1] // images.itemsize
+        arguments = (pointer, *strides, buffer(kind, which), buffer("double *", numbers))
 
         def rows(begin: int, end: int) -> NDArray[np.intp]:
-            left_over = scratch((end - begin) * width)
-            found = entry(begin, end, ffi.cast("ptrdiff_t *", left_over.ctypes.data))
-            return left_over[:found].copy()
+            places = scratch((end - begin) * width)
+            found = function(*arguments, begin, end, buffer("ptrdiff_t *", places))
+            return places[:found].copy()
 
         return rows
 

@@ -63,6 +63,10 @@ def over_rows(render: Render, height: int, threads: int, *, width: int = 1, firs
     if threads == 1 and pixels <= MOST_PIXELS:
         render(first, first + height)
         return
+    if pixels > MOST_PIXELS and isinstance(render, Shared):
+        folded = render.folded(first, first + height)
+        if folded is not None:
+            render, height, width = folded, height - height // 2, 2 * width
     if threads > 1 and first + height <= MOST_ROWS and isinstance(render, Shared):
         if pixels < LEAST_TURNS * render.least_pixels:
             render(first, first + height)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import sympy as sp
 
 from symrender_cg.derive.forms.form import Claim, Form
+from symrender_cg.derive.forms.normal import cross_foot, normal_from_foot, off_axis_foot
 from symrender_cg.derive.program import Definition, ImageProgram
 from symrender_cg.derive.symbols import symbol as S
 from symrender_cg.derive.symbols import symbols
@@ -77,39 +78,31 @@ def _mirror_of_centred() -> tuple[Definition, ...]:
 
 
 def _mirror_off_axis() -> tuple[Definition, ...]:
-    x, y, focal, depth = symbols("x y focal depth")
     dx, dy, tilt = symbols("dx dy tilt")
-    foot = (depth * (focal * dx - tilt * y), depth * (focal * dy + tilt * x), depth * (x * dx + y * dy))
-    return _mirror_by_foot(foot, S("depth2") * (dx**2 + dy**2 + tilt**2))
+    return _mirror_by_foot(off_axis_foot(), S("depth2") * (dx**2 + dy**2 + tilt**2))
 
 
 def _mirror_near() -> tuple[Definition, ...]:
-    x, y, focal, c_x, c_y, c_z = symbols("x y focal cross_x cross_y cross_z")
-    foot = (-c_y * focal - c_z * y, c_x * focal + c_z * x, c_x * y - c_y * x)
-    return _mirror_by_foot(foot, c_x**2 + c_y**2 + c_z**2)
+    c_x, c_y, c_z = symbols("cross_x cross_y cross_z")
+    return _mirror_by_foot(cross_foot(), c_x**2 + c_y**2 + c_z**2)
 
 
 def _mirror_by_foot(foot: tuple[sp.Expr, ...], gap2: sp.Expr) -> tuple[Definition, ...]:
-    x, y, focal, facing, inv_d2, turn, bounce = symbols("x y focal facing inv_d2 turn bounce")
-    ray = (x, y, -focal)
+    x, y, focal, turn, bounce = symbols("x y focal turn bounce")
     meaning = "F, the foot point of the ray times |D|^2, is at right angles to D"
+    normals = normal_from_foot()
     return (
         *(Definition(f"foot_{axis}", foot[i], "normal", meaning if i == 0 else "") for i, axis in enumerate("xyz")),
         *(
-            Definition(
-                f"n_{axis}",
-                (S(f"foot_{axis}") - facing * ray[i]) * inv_d2,
-                "normal",
-                "n is F less facing D, over |D|^2" if i == 0 else "",
-            )
+            Definition(f"n_{axis}", normals[i], "normal", "n is F less facing D, over |D|^2" if i == 0 else "")
             for i, axis in enumerate("xyz")
         ),
         *_turn(gap2),
         *(
             Definition(
-                f"mirror_{axis}", ray[i] * turn + bounce * S(f"foot_{axis}"), _SPECULAR, _MIRROR if i == 0 else ""
+                f"mirror_{axis}", ray * turn + bounce * S(f"foot_{axis}"), _SPECULAR, _MIRROR if axis == "x" else ""
             )
-            for i, axis in enumerate("xyz")
+            for axis, ray in zip("xyz", (x, y, -focal), strict=True)
         ),
     )
 

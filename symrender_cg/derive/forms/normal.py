@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sympy as sp
+
 from symrender_cg.derive.forms.form import Claim, Form
 from symrender_cg.derive.program import Definition, ImageProgram
 from symrender_cg.derive.symbols import symbol as S
@@ -26,33 +28,49 @@ def _centred_normal(_: ImageProgram) -> tuple[Definition, ...]:
     )
 
 
+def off_axis_foot() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """The foot point times |D|^2, by differences from the image of the centre."""
+    x, y, focal, depth, dx, dy, tilt = symbols("x y focal depth dx dy tilt")
+    return depth * (focal * dx - tilt * y), depth * (focal * dy + tilt * x), depth * (x * dx + y * dy)
+
+
+def cross_foot() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """The foot point times |D|^2, by the cross product m x D."""
+    x, y, focal, c_x, c_y, c_z = symbols("x y focal cross_x cross_y cross_z")
+    return -c_y * focal - c_z * y, c_x * focal + c_z * x, c_x * y - c_y * x
+
+
+def normal_from_foot() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """n from named components of the foot point."""
+    x, y, focal, facing, inv_d2 = symbols("x y focal facing inv_d2")
+    n_x, n_y, n_z = (
+        (S(f"foot_{axis}") - facing * ray) * inv_d2 for axis, ray in zip("xyz", (x, y, -focal), strict=True)
+    )
+    return n_x, n_y, n_z
+
+
 def _off_axis_normal(_: ImageProgram) -> tuple[Definition, ...]:
-    x, y, focal, depth, facing, inv_d2 = symbols("x y focal depth facing inv_d2")
-    dx, dy, tilt = symbols("dx dy tilt")
-    image_x, image_y = symbols("image_x image_y")
+    x, y, focal, facing, inv_d2 = symbols("x y focal facing inv_d2")
+    dx, dy, image_x, image_y = symbols("dx dy image_x image_y")
+    foot_x, foot_y, foot_z = off_axis_foot()
     return (
         _inverse(),
         Definition("dx", x - image_x, _NORMAL, "the pixel seen from the image of the centre"),
         Definition("dy", y - image_y, _NORMAL),
         Definition("tilt", (image_x * dy - image_y * dx) / focal, _NORMAL),
-        Definition("n_x", (depth * (focal * dx - tilt * y) - facing * x) * inv_d2, _NORMAL, _FOOT),
-        Definition("n_y", (depth * (focal * dy + tilt * x) - facing * y) * inv_d2, _NORMAL),
-        Definition("n_z", (depth * (x * dx + y * dy) + focal * facing) * inv_d2, _NORMAL),
+        Definition("n_x", (foot_x - facing * x) * inv_d2, _NORMAL, _FOOT),
+        Definition("n_y", (foot_y - facing * y) * inv_d2, _NORMAL),
+        Definition("n_z", (foot_z + focal * facing) * inv_d2, _NORMAL),
     )
 
 
 def _any_normal(_: ImageProgram) -> tuple[Definition, ...]:
-    x, y, focal, facing, inv_d2 = symbols("x y focal facing inv_d2")
-    c_x, c_y, c_z = symbols("cross_x cross_y cross_z")
-    foot = (-c_y * focal - c_z * y, c_x * focal + c_z * x, c_x * y - c_y * x)
-    return (
-        _inverse(),
-        *(Definition(f"foot_{axis}", foot[i], _NORMAL, _FOOT if i == 0 else "") for i, axis in enumerate("xyz")),
-        *(
-            Definition(f"n_{axis}", (S(f"foot_{axis}") - facing * ray) * inv_d2, _NORMAL)
-            for axis, ray in zip("xyz", (x, y, -focal), strict=True)
-        ),
-    )
+    components = zip("xyz", cross_foot(), normal_from_foot(), strict=True)
+    feet, normals = [], []
+    for axis, foot, normal in components:
+        feet.append(Definition(f"foot_{axis}", foot, _NORMAL, _FOOT if axis == "x" else ""))
+        normals.append(Definition(f"n_{axis}", normal, _NORMAL))
+    return (_inverse(), *feet, *normals)
 
 
 def _normal_claims() -> tuple[Claim, ...]:
