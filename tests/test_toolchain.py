@@ -482,4 +482,8 @@ def test_the_vectors_of_a_level_are_those_of_its_kernel(monkeypatch: pytest.Monk
     monkeypatch.setattr(vectors, "goals", lambda: ())
     kernel, sources = vectors._sources("single")
     assert kernel == "centred_sphere_single"
-    assert {loop.function for loop in vectors.survey(kernel, sources).loops} >= {"draw_rows", "finish", f"{kernel}_points"}
+    assert {loop.function for loop in vectors.survey(kernel, sources).loops} >= {
+        "draw_rows",
+        "finish",
+        f"{kernel}_points",
+    }
