@@ -78,20 +78,22 @@ class NativeRows(partial[None], Shared):
 
     def share(self, pool: Pool, begin: int, end: int, least: int, threads: int) -> None:
         """Draws rows [begin, end) on so many threads, at least so many rows at a time."""
-        folded = self.folded(begin, end)
-        if folded is not None:
-            folded.share(pool, 0, end - end // 2, -(-least // 2), threads)
-            return
-        arguments = self.args
+        arguments, function = self.args, self.func
+        if self._folds(begin, end):  # as `folded`, without an object for it
+            function, end, least = self.pairs, end - end // 2, -(-least // 2)
         entry, addresses, pointer_type = pool.kinds[len(arguments)]
-        function = addresses.get(self.func)
-        if function is None:
-            function = addresses[self.func] = pool.library.ffi.cast(pointer_type, self.func)
-        entry(function, *arguments, begin, end, least, threads)
+        address = addresses.get(function)
+        if address is None:
+            address = addresses[function] = pool.library.ffi.cast(pointer_type, function)
+        entry(address, *arguments, begin, end, least, threads)
+
+    def _folds(self, begin: int, end: int) -> bool:
+        """Whether these rows are the whole image, and the kernel draws it in pairs of rows."""
+        return self.pairs is not None and begin == 0 and end == self.args[2].height
 
     def folded(self, begin: int, end: int) -> NativeRows | None:
         """Rows j and height - 1 - j as one, where rows [begin, end) are the whole image and the kernel has them."""
-        if self.pairs is None or begin != 0 or end != self.args[2].height:
+        if not self._folds(begin, end):
             return None
         rows = NativeRows(self.pairs, *self.args)
         rows.library, rows.pairs = self.library, None
