@@ -41,6 +41,10 @@ ACCURACIES: Final = ("double", "single")
 PLANNED: Final = 3
 """Scenes that planning is timed on."""
 
+IDLE: Final = 0.06
+"""Seconds of images that follow one another, of which the fastest counts: the threads of the contestant before look out
+for work, each on a processor, for tens of milliseconds after their last image."""
+
 LEVEL: Final = 1.0 / 255.0
 OTHER_PICTURE: Final = 0.01
 """The part of the pixels from which on a ratio of times would compare two different pictures."""
@@ -170,7 +174,7 @@ def _row(
             for threads in sorted({1, cores()}):
                 draw = _ours(scene, size, accuracy, threads)
                 pictures[ours_name(accuracy, threads)] = draw()
-                calls[ours_name(accuracy, threads)] = warm_sample(draw)
+                calls[ours_name(accuracy, threads)] = warm_sample(draw, IDLE)
         planning = _planning(count, seed, shadows, size)
     except OutsidePlanError as reason:
         refused = str(reason)
@@ -183,7 +187,7 @@ def _row(
         for peer, lean in ((AS_IS, False), (LEAN, True)):
             image = mitsuba.picture(scene, size, size, threads=cores(), lean=lean)
             pictures[peer] = image()
-            calls[peer] = warm_sample(image)
+            calls[peer] = warm_sample(image, IDLE)
     samples = take_turns(calls, rounds, seed, lambda number: told(f"{name}: round {number + 1} of {rounds}"))
     times = {contestant: spread(values) for contestant, values in samples.items()}
     base, *others = pictures or [""]
