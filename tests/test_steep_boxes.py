@@ -29,6 +29,7 @@ from symrender_cg.run.settling_kernel import SettlingKernel
 from symrender_cg.run.settling_many import enclosed_many
 from symrender_cg.run.steep import MOST_OF_PICTURE, Box, boxes_drawn, roundoffs, steep_box, steep_boxes
 from symrender_cg.scene import Camera, Phong, PointLight, Sphere
+from symrender_cg.stress.families import FAMILIES
 
 GLOSSY = Scene.chapter1(shininess=300.0)
 FROM_BELOW = Scene.chapter1(light=(-3.0, -6.0, 10.0), shininess=100.0)
@@ -118,6 +119,17 @@ def test_the_boxes_of_many_scenes_have_the_bits_of_each_alone() -> None:
         assert same_bits(needed, np.full(4, np.nan) if plain else edges)
         found += box is not None and not plain
     assert found > 20
+
+
+def test_a_box_holds_a_highlight_that_is_narrower_than_what_is_known_of_its_middle() -> None:
+    """Exponents up to 1e100, at points of the highlight: no value of `double` is off by more than it promises."""
+    boxed = 0
+    (family,) = (entry for entry in FAMILIES if entry.name == "n_huge")
+    for case in family.cases(1, 60):
+        boxed += steep_part(case.scene, 1.0) is not None
+        values = [float(evaluate(case.scene, case.x, case.y, accuracy=level)) for level in ("double", "stable")]
+        assert abs(values[0] - values[1]) <= 1e-15 * max(1.0, values[1]), case
+    assert boxed > 5
 
 
 def test_a_box_over_most_of_the_spheres_picture_leaves_the_scene_to_stable_whatever_the_window() -> None:

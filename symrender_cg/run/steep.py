@@ -43,6 +43,13 @@ FARTHEST = 1e60
 ROOM = 1.1
 CORNERS = 24
 
+NEARLY_MIDDLE = 1e-9
+"""Radians by which the middle of a highlight is turned at last where it counts as found."""
+
+AROUND_MIDDLE = 1e-7
+"""What a box has beyond the highlight, in radii, a hundred times as much: a highlight may be narrower than what is
+known of its middle."""
+
 
 @dataclass(frozen=True, slots=True)
 class Box:
@@ -196,7 +203,7 @@ def _boxes_around(numbers: Mapping[str, Floats], angle: Floats) -> Floats:
     with np.errstate(all="ignore"):
         middle = _middles_of_highlights(to_light / np.maximum(radius, np.abs(to_light).max(axis=0) / FARTHEST), to_eye)
         facing = _dot(middle, _unit(to_eye - middle))
-        sine = np.where(facing >= LEAST_FACING, ROOM * _each(math.sin, 0.5 * angle) / facing, np.inf)
+        sine = np.where(facing >= LEAST_FACING, ROOM * _each(math.sin, 0.5 * angle) / facing + AROUND_MIDDLE, np.inf)
         first = _unit(_cross(middle, np.eye(3)[:, np.argmin(np.abs(middle), axis=0)]))
         second = _cross(middle, first)
         ring = np.multiply.outer(_COSINES, first) + np.multiply.outer(_SINES, second)
@@ -235,7 +242,7 @@ def _middles_of_highlights(to_light: Floats, to_eye: Floats) -> Floats:
         inverse = 1.0 / np.sqrt(_dot(ways, ways))
         half = _unit((inverse * ways).sum(axis=1))
         turn = half - middle
-        near = np.abs(turn).max(axis=0) < 1e-9
+        near = np.abs(turn).max(axis=0) < NEARLY_MIDDLE
         middle = _unit(middle + turn / (1.0 + 0.5 * inverse.sum(axis=0)))
         if near.any():
             found[:, left[near]] = half[:, near]
