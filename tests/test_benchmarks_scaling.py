@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+from typing import Protocol
 
 import numpy as np
 import pytest
@@ -26,9 +27,13 @@ COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 PIXELS = [float(4**k) for k in range(6, 14)]
 
 
-def shown(report: object) -> str:
+class Shown(Protocol):
+    def show(self, console: Console) -> None: ...
+
+
+def shown(report: Shown) -> str:
     console = Console(width=250, file=io.StringIO())
-    report.show(console)  # type: ignore[attr-defined]
+    report.show(console)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
 

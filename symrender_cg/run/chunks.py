@@ -59,7 +59,7 @@ _AS_PIXELS = 16
 
 _NO_BOX = np.full((1, 4), np.nan)
 
-L = TypeVar("L")
+L = TypeVar("L", bound=Lot)
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class Chunk:
         found = self.lots.get(key)
         if found is None:
             made = kind(*arguments)
-            self.lots[key] = made  # type: ignore[assignment]
+            self.lots[key] = made
             return made
         assert isinstance(found, kind)
         return found

@@ -5,6 +5,7 @@ In: the numbers of each set. Out: images with the bits of render_image. Never he
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(eq=False)
-class _SphereLot:
+class _SphereLot(ABC):
     """Sets of one kernel.
 
     names     what the columns of numbers are, among them the kernel's inputs
@@ -46,8 +47,9 @@ class _SphereLot:
         for piece, images in onto.neighbours(self.sets):
             self._draw(onto, piece, images, grids[piece])
 
+    @abstractmethod
     def _draw(self, onto: Target, piece: slice, images: NDArray[Any], grids: NDArray[Any]) -> None:
-        raise NotImplementedError
+        """Draws the images of some of the sets, which follow one another in the batch."""
 
     def _given(self, kernel: Kernel, piece: slice) -> Floats:
         """(sets, inputs): what a kernel takes of a part of the sets."""
